@@ -1,0 +1,33 @@
+"""The physics, one place per level of the report, as small pure functions of scalars.
+
+Importing this package registers every law that comes with it.
+"""
+
+from limb_nodes.levels import limb, motor_unit, muscle, sarcomere
+from limb_nodes.levels.contracts import CONTRACTS, REGISTRY, Contract, law, register
+from limb_nodes.levels.equation import (
+    Equation,
+    Law,
+    Parameter,
+    State,
+    equation,
+    equation_of,
+)
+
+__all__ = [
+    "CONTRACTS",
+    "REGISTRY",
+    "Contract",
+    "Equation",
+    "Law",
+    "Parameter",
+    "State",
+    "equation",
+    "equation_of",
+    "law",
+    "limb",
+    "motor_unit",
+    "muscle",
+    "register",
+    "sarcomere",
+]

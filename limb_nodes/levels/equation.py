@@ -1,0 +1,144 @@
+"""The vocabulary of the levels: equations, parameters, states and laws.
+
+An *equation* is a small pure function of scalars. Its name in the report, the variable that it
+defines and the quantities that it uses (its arguments) are read from the function itself, so that
+the program that runs, the curves that are drawn and the structure matrices that are printed all
+come from one place.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+ScalarFunction = Callable[..., float]
+
+
+@dataclass(frozen=True)
+class Equation:
+    """One equation of the model in the form ``defines = function(uses)``.
+
+    number: the equation's number in the report, or a short name where the report has none.
+    defines: the variable on the left-hand side.
+    function: pure function of floats that returns a float.
+    """
+
+    number: str
+    defines: str
+    function: ScalarFunction
+
+    @property
+    def uses(self) -> tuple[str, ...]:
+        """Names of the quantities on the right-hand side, in the order of the arguments."""
+        return tuple(inspect.signature(self.function).parameters)
+
+
+def equation(number: str, defines: str) -> Callable[[ScalarFunction], ScalarFunction]:
+    """Mark a function as the equation `number` that defines the variable `defines`."""
+
+    def mark(function: ScalarFunction) -> ScalarFunction:
+        function.__dict__["equation"] = Equation(number, defines, function)
+        return function
+
+    return mark
+
+
+def equation_of(function: ScalarFunction) -> Equation:
+    """The equation that `equation` attached to a function."""
+    found = function.__dict__.get("equation")
+    if not isinstance(found, Equation):
+        raise TypeError(f"{function.__name__} is not marked with @equation")
+    return found
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that the user gives: name, unit, meaning, allowed range, default and its source.
+
+    default: a float, the name of another parameter of the same owner, or None where it must be
+        given.
+    above, below: strict bounds; minimum, maximum: bounds that are themselves allowed.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    default: float | str | None = None
+    source: str = "estimate"
+    minimum: float | None = None
+    maximum: float | None = None
+    above: float | None = None
+    below: float | None = None
+    integer: bool = False
+
+    def allowed(self) -> str:
+        """The allowed values in words, for error messages and the reference of keys."""
+        kind = "an integer" if self.integer else "a number"
+        bounds = [
+            f"{sign} {bound:g}"
+            for sign, bound in (
+                (">", self.above),
+                (">=", self.minimum),
+                ("<", self.below),
+                ("<=", self.maximum),
+            )
+            if bound is not None
+        ]
+        text = " and ".join([f"{kind} {bounds[0]}", *bounds[1:]]) if bounds else kind
+        return f"{text} in {self.unit}" if self.unit != "1" else text
+
+    def accepts(self, value: float) -> bool:
+        """Whether `value` is finite and within the bounds."""
+        return (
+            abs(value) < float("inf")
+            and (self.minimum is None or value >= self.minimum)
+            and (self.maximum is None or value <= self.maximum)
+            and (self.above is None or value > self.above)
+            and (self.below is None or value < self.below)
+            and (not self.integer or value == int(value))
+        )
+
+
+@dataclass(frozen=True)
+class State:
+    """A variable that is integrated: d(name)/dt = rate.
+
+    name: the variable; rate: the variable that holds its rate of change.
+    number: the number of the differential equation in the report.
+    initial: name of the law's parameter that holds the initial value.
+    scale: typical magnitude in SI units, against which the integrators weigh its error.
+    """
+
+    name: str
+    rate: str
+    number: str
+    initial: str
+    scale: float
+    unit: str = "1"
+
+
+@dataclass(frozen=True)
+class Law:
+    """One model of one process, chosen by name in a limb's YAML.
+
+    process: key of the contract that the law fulfils (see `limb_nodes.levels.contracts`).
+    equations: the law's equations; together they define what the contract asks for.
+    """
+
+    process: str
+    name: str
+    equations: tuple[Equation, ...]
+    parameters: tuple[Parameter, ...] = ()
+    states: tuple[State, ...] = ()
+    source: str = ""
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict, hash=False, compare=False)
+
+    def __call__(self, *values: float) -> float:
+        """Evaluate the law's last equation: the characteristic that the law is known by."""
+        return self.equations[-1].function(*values)
+
+    @property
+    def summary(self) -> str:
+        """First line of the characteristic's docstring."""
+        return (inspect.getdoc(self.equations[-1].function) or self.name).splitlines()[0]

@@ -1,0 +1,1 @@
+"""Level of the limb: a planar chain of segments."""

@@ -1,0 +1,88 @@
+"""A limb as checked data: segments, muscles and motor units with their laws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from limb_nodes.model.choice import ChosenLaw
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A segment and the joint at its proximal end. SI units, radians.
+
+    joint_range: lowest and highest joint angle, or None where the joint turns freely.
+    angle, velocity: of the joint at the start.
+    """
+
+    name: str
+    joint: str
+    mass: float
+    length: float
+    com_distance: float
+    inertia: float
+    angle: float
+    velocity: float
+    joint_range: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class MotorUnit:
+    """A motor unit: the parameters of `levels.motor_unit.PARAMETERS`, its threshold and laws.
+
+    values: includes `unit_threshold` (activation at which it fires) and `unit_rank` (its place in
+        the recruitment order, from 0 to 1).
+    laws: by process: sarcomere, force_length, force_frequency, passive_force, recruitment.
+    """
+
+    name: str
+    values: dict[str, float]
+    laws: dict[str, ChosenLaw]
+
+
+@dataclass(frozen=True)
+class Muscle:
+    """A muscle over one joint, its units in the order of recruitment.
+
+    role: +1 for a flexor (pulls the joint angle up), -1 for an extensor.
+    laws: by process: path, tendon, aponeurosis, activation_dynamics.
+    """
+
+    name: str
+    joint: int
+    role: float
+    activation_threshold: float
+    laws: dict[str, ChosenLaw]
+    units: tuple[MotorUnit, ...]
+    place: str
+
+
+@dataclass(frozen=True)
+class Limb:
+    """A limb. Angles in rad, lengths in m, forces in N, in the plane x right, y up.
+
+    text, file: the YAML that it was read from; content: the same as plain data.
+    """
+
+    name: str
+    gravity: tuple[float, float]
+    base_angle: float
+    base_position: tuple[float, float]
+    tip_force: tuple[float, float]
+    tip_torque: float
+    segments: tuple[Segment, ...]
+    muscles: tuple[Muscle, ...]
+    file: str = field(compare=False)
+    text: str = field(compare=False)
+    content: dict[str, Any] = field(compare=False)
+
+    @property
+    def joint_names(self) -> list[str]:
+        """Names of the joints from proximal to distal."""
+        return [segment.joint for segment in self.segments]
+
+    @property
+    def muscle_names(self) -> list[str]:
+        """Names of the muscles in the order of the file."""
+        return [muscle.name for muscle in self.muscles]

@@ -1,0 +1,283 @@
+"""From a limb's YAML to a checked `Limb`."""
+
+from __future__ import annotations
+
+import copy
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from limb_nodes.errors import UserError
+from limb_nodes.levels import Parameter, motor_unit, sarcomere
+from limb_nodes.levels.motor_unit.recruitment import unit_thresholds
+from limb_nodes.model.check import check_geometry, check_unit
+from limb_nodes.model.choice import ChosenLaw, choose_law, read_law
+from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
+from limb_nodes.model.section import Section, parse_yaml, read_yaml
+
+BASE_ANGLE = Parameter(
+    "base_angle",
+    "rad",
+    "direction of the fixed segment that joint 1 hangs from, counter-clockwise from +x",
+    -math.pi / 2,
+    "hangs straight down at zero joint angles",
+    minimum=-2 * math.pi,
+    maximum=2 * math.pi,
+)
+TIP_TORQUE = Parameter(
+    "tip_torque", "N m", "torque of the environment on the last segment", 0.0, "depends on the run"
+)
+SEGMENT_PARAMETERS = (
+    Parameter("mass", "kg", "mass of the segment, m", above=0.0, maximum=1e4),
+    Parameter("length", "m", "distance to the next joint or the tip, l", above=0.0, maximum=100.0),
+    Parameter(
+        "com_distance",
+        "m",
+        "distance of the centre of mass from the proximal joint, l_COM",
+        minimum=0.0,
+        maximum=100.0,
+    ),
+    Parameter("inertia", "kg m^2", "moment of inertia about the centre of mass", above=0.0),
+    Parameter(
+        "angle",
+        "rad",
+        "joint angle at the start",
+        0.0,
+        "depends on the run",
+        minimum=-2 * math.pi,
+        maximum=2 * math.pi,
+    ),
+    Parameter(
+        "velocity",
+        "rad/s",
+        "joint velocity at the start",
+        0.0,
+        "depends on the run",
+        minimum=-1e3,
+        maximum=1e3,
+    ),
+)
+ACTIVATION_THRESHOLD = Parameter(
+    "activation_threshold",
+    "1",
+    "activation at which all motor units are recruited, U_th",
+    0.0,
+    "depends on the muscle",
+    minimum=0.0,
+    below=1.0,
+)
+COUNT = Parameter(
+    "count", "1", "number of such units", 1.0, "depends on the muscle", 1.0, 10000.0, integer=True
+)
+ORDER = Parameter("order", "1", "place in the recruitment order, R_F", 0.0, "position in the list")
+ROLES = {"flexor": 1.0, "extensor": -1.0}
+UNIT_LAWS = ("force_length", "force_frequency", "passive_force")
+
+
+def load_limb(path: str | Path) -> Limb:
+    """Read and check a limb's YAML file.
+
+    Raises UserError, one line with file, place, value and what is allowed.
+    """
+    content, text = read_yaml(Path(path))
+    return build_limb(content, str(path), text)
+
+
+def parse_limb(text: str, file: str) -> Limb:
+    """The same from text, such as a bag holds it; `file` appears in errors."""
+    return build_limb(parse_yaml(text, file), file, text)
+
+
+def with_values(limb: Limb, values: Mapping[str, Any]) -> Limb:
+    """A limb with other values at places such as ``muscles[0].tendon.stiffness``.
+
+    A place that is not in the limb's file is added; all checks run again. Raises UserError.
+    """
+    content = copy.deepcopy(limb.content)
+    for place, value in values.items():
+        steps: list[str | int] = [
+            int(index) if index else name
+            for name, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", place)
+        ]
+        target: Any = content
+        for step, following in zip(steps[:-1], steps[1:], strict=True):
+            try:
+                if isinstance(target, dict) and target.get(step) is None:
+                    target[step] = [] if isinstance(following, int) else {}
+                target = target[step]
+            except (IndexError, KeyError, TypeError):
+                raise UserError(f"{limb.file}: {place} is not a place of this limb") from None
+        try:
+            target[steps[-1]] = value
+        except (IndexError, TypeError):
+            raise UserError(f"{limb.file}: {place} is not a place of this limb") from None
+    return build_limb(content, limb.file, limb.text)
+
+
+def build_limb(content: Any, file: str, text: str) -> Limb:
+    """Check the content of a limb's file and make a `Limb` of it."""
+    top = Section(file, "", content)
+    segments = tuple(read_segment(section) for section in top.sections("segments", required=True))
+    joints = [segment.joint for segment in segments]
+    refuse_twins(top, "segments", "joint", joints)
+    sarcomeres = read_named(top, "sarcomeres")
+    kinds = read_named(top, "unit_kinds")
+    muscles = tuple(
+        read_muscle(section, joints, sarcomeres, kinds)
+        for section in top.sections("muscles", required=False)
+    )
+    refuse_twins(top, "muscles", "name", [muscle.name for muscle in muscles])
+    limb = Limb(
+        name=top.text("name"),
+        gravity=pair(top.vector("gravity", 2, (0.0, -9.81))),
+        base_angle=needed(top.number(BASE_ANGLE)),
+        base_position=pair(top.vector("base_position", 2, (0.0, 0.0))),
+        tip_force=pair(top.vector("tip_force", 2, (0.0, 0.0))),
+        tip_torque=needed(top.number(TIP_TORQUE)),
+        segments=segments,
+        muscles=muscles,
+        file=file,
+        text=text,
+        content=content,
+    )
+    top.finish()
+    for muscle in muscles:
+        check_geometry(file, muscle, segments[muscle.joint])
+    return limb
+
+
+def read_segment(section: Section) -> Segment:
+    """One entry of `segments`."""
+    values = {
+        parameter.name: needed(section.number(parameter)) for parameter in SEGMENT_PARAMETERS
+    }
+    joint_range = None
+    if section.has("range"):
+        joint_range = pair(section.vector("range", 2, None))
+        if joint_range[0] >= joint_range[1]:
+            section.fail("range", f"is {list(joint_range)}; [lowest, highest] in rad is needed")
+        if not joint_range[0] <= values["angle"] <= joint_range[1]:
+            section.fail(
+                "angle", f"is {values['angle']}; a number within range {list(joint_range)} in rad"
+            )
+    else:
+        section.take("range")
+    name = section.text("name")
+    segment = Segment(
+        name=name, joint=section.text("joint", name), joint_range=joint_range, **values
+    )
+    section.finish()
+    return segment
+
+
+def read_muscle(
+    section: Section,
+    joints: list[str],
+    sarcomeres: dict[str, Section],
+    kinds: dict[str, Section],
+) -> Muscle:
+    """One entry of `muscles`."""
+    name = section.text("name")
+    joint = section.choice("joint", joints)
+    role = ROLES[section.choice("role", ROLES)]
+    threshold = needed(section.number(ACTIVATION_THRESHOLD))
+    laws = {
+        process: choose_law(section, process, process)
+        for process in ("path", "tendon", "aponeurosis", "activation_dynamics")
+    }
+    recruitment = choose_law(section, "recruitment", "recruitment")
+    units: list[tuple[float, MotorUnit]] = []
+    for position, unit_section in enumerate(section.sections("units", required=True)):
+        units += read_units(unit_section, position, sarcomeres, kinds, recruitment)
+    units.sort(key=lambda entry: entry[0])
+    ordered = [unit for _, unit in units]
+    refuse_twins(section, "units", "name", [unit.name for unit in ordered])
+    section.finish()
+    thresholds = unit_thresholds([unit.values["pcsa"] for unit in ordered], threshold)
+    for rank, (unit, unit_threshold) in enumerate(zip(ordered, thresholds, strict=True)):
+        unit.values["unit_threshold"] = unit_threshold
+        unit.values["unit_rank"] = rank / max(1, len(ordered) - 1)
+    return Muscle(
+        name, joints.index(joint), role, threshold, laws, tuple(ordered), section.place
+    )
+
+
+def read_units(
+    section: Section,
+    position: int,
+    sarcomeres: dict[str, Section],
+    kinds: dict[str, Section],
+    recruitment: ChosenLaw,
+) -> list[tuple[float, MotorUnit]]:
+    """One entry of `units`: `count` units with their place in the recruitment order."""
+    if section.has("kind"):
+        kind = kinds[section.choice("kind", kinds)]
+        content = {**kind.content, **section.content}
+        inherited = {key: kind.at(key) for key in kind.content if key not in section.content}
+        section = Section(section.file, section.place, content, inherited)
+    section.take("kind")
+    name = section.text("name", section.content.get("kind") or f"unit{position + 1}")
+    count = int(needed(section.number(COUNT)))
+    order = needed(section.number(ORDER)) if section.has("order") else float(position)
+    section.take("order")
+    values = {
+        parameter.name: needed(section.number(parameter)) for parameter in motor_unit.PARAMETERS
+    }
+    if values["maximum_frequency"] <= values["minimum_frequency"]:
+        section.fail(
+            "maximum_frequency",
+            f"is {values['maximum_frequency']:g}; a number > minimum_frequency "
+            f"({values['minimum_frequency']:g}) in Hz is needed",
+        )
+    laws = {process: choose_law(section, process, process) for process in UNIT_LAWS}
+    laws["sarcomere"] = read_sarcomere(section, sarcomeres)
+    laws["recruitment"] = recruitment
+    section.finish()
+    check_unit(section, values, laws)
+    return [
+        (
+            order,
+            MotorUnit(name if count == 1 else f"{name}_{index + 1}", dict(values), laws),
+        )
+        for index in range(count)
+    ]
+
+
+def read_sarcomere(section: Section, sarcomeres: dict[str, Section]) -> ChosenLaw:
+    """The sarcomere of a unit: a name under `sarcomeres`, a law's name, or a mapping."""
+    named = section.content.get("sarcomere")
+    if isinstance(named, str) and named in sarcomeres:
+        section.take("sarcomere")
+        kind = sarcomeres[named]
+        fresh = Section(kind.file, kind.place, kind.content)
+        return read_law(fresh, "sarcomere", sarcomere.PARAMETERS)
+    return choose_law(section, "sarcomere", "sarcomere", sarcomere.PARAMETERS)
+
+
+def read_named(top: Section, key: str) -> dict[str, Section]:
+    """A mapping of names to mappings, which may be missing."""
+    if not top.has(key):
+        top.take(key)
+        return {}
+    holder = top.section(key)
+    return {name: holder.section(name) for name in holder.content}
+
+
+def refuse_twins(section: Section, key: str, field: str, names: list[str]) -> None:
+    """Refuse a list in which two entries have the same name."""
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            section.fail(f"{key}[{index}].{field}", f"is {name!r} a second time; names are unique")
+
+
+def pair(values: tuple[float, ...]) -> tuple[float, float]:
+    """A vector of two numbers."""
+    return (values[0], values[1])
+
+
+def needed(value: float | None) -> float:
+    """A number that `Section.number` has found or has a numeric default for."""
+    assert value is not None
+    return value
