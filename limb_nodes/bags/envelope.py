@@ -1,0 +1,166 @@
+"""The steps from raw EMG to a normalised envelope, each a function of arrays.
+
+The usual chain is band_pass, rectify, low_pass, normalise; the defaults stand with their sources:
+
+- band 20 to 450 Hz: a corner of 20 Hz with 12 dB/octave removes movement artefacts; above 400 to 450 Hz
+  is noise (De Luca, Gilmore, Kuznetsov and Roy, J Biomech 43 (2010) 1573). 12 dB/octave is the
+  second-order filter that runs here in each direction.
+- low-pass 6 Hz, fourth order, no phase shift: the linear envelope (Winter, Biomechanics and Motor
+  Control of Human Movement, 4th ed. 2009, ch. 10: 3 to 6 Hz for movement).
+- order and zero phase: a Butterworth filter of half the order runs forward and backward, its corner
+  corrected so that the two passes together lose 3 dB where asked (Winter, ch. 3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import butter, sosfiltfilt
+
+from limb_nodes.bags.table import FloatArray
+
+DEFAULT_BAND = (20.0, 450.0)
+DEFAULT_LOW_PASS = 6.0
+DEFAULT_ORDER = 4
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """What was bridged in one channel.
+
+    count: runs of missing samples; samples: missing samples in all; longest: samples of the longest run.
+    """
+
+    count: int
+    samples: int
+    longest: int
+
+
+def bridge_gaps(values: FloatArray) -> tuple[FloatArray, Gaps]:
+    """Replace missing samples (NaN) along straight lines; ends hold the nearest value.
+
+    values: [samples]. Returns the same without NaN, and what was bridged.
+    Raises ValueError where no sample is finite.
+    """
+    missing = ~np.isfinite(values)
+    if missing.all():
+        raise ValueError("no finite sample")
+    if not missing.any():
+        return values.copy(), Gaps(0, 0, 0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
+    lengths = edges[1::2] - edges[::2]
+    where = np.arange(len(values))
+    bridged = np.interp(where, where[~missing], values[~missing])
+    return bridged, Gaps(len(lengths), int(lengths.sum()), int(lengths.max()))
+
+
+def band_pass(values: FloatArray, rate: float, band: tuple[float, float], order: int = DEFAULT_ORDER) -> FloatArray:
+    """Keep the frequencies between two edges (Hz), without phase shift.
+
+    values: [samples, channels], no NaN; rate in Hz; each edge is a filter of the given (even) order, 3 dB down
+    at the edge. Returns an array of the same shape and unit. Raises ValueError as `check_filter` does.
+    """
+    low, high = band
+    if not low < high:
+        raise ValueError(f"band-pass {low:g} {high:g} Hz: the lower edge must be below the upper")
+    return _zero_phase(_zero_phase(values, rate, low, order, "highpass"), rate, high, order, "lowpass")
+
+
+def rectify(values: FloatArray) -> FloatArray:
+    """Full-wave rectification: the absolute value."""
+    return np.abs(values)
+
+
+def low_pass(
+    values: FloatArray, rate: float, corner: float = DEFAULT_LOW_PASS, order: int = DEFAULT_ORDER
+) -> FloatArray:
+    """Smooth without phase shift.
+
+    values: [samples, channels], no NaN; rate and corner in Hz; 3 dB down at the corner. Returns an array of the
+    same shape and unit. Raises ValueError as `check_filter` does.
+    """
+    return _zero_phase(values, rate, corner, order, "lowpass")
+
+
+def check_filter(samples: int, rate: float, corner: float, order: int) -> None:
+    """Raise ValueError with a sentence where a filter cannot work on such a signal.
+
+    The corner lies between 0 and half the rate, the order is even and 2 to 12, and the signal lasts one
+    period of the corner frequency at least.
+    """
+    if order < 2 or order > 12 or order % 2:
+        raise ValueError(f"filter order {order}: must be even, 2 to 12")
+    if not 0 < corner < rate / 2:
+        raise ValueError(f"filter corner {corner:g} Hz: must lie between 0 and half the rate, {rate / 2:g} Hz")
+    if samples < max(2, rate / corner):
+        raise ValueError(
+            f"{samples} samples: a filter corner of {corner:g} Hz needs one period at least, "
+            f"{int(np.ceil(rate / corner))} samples"
+        )
+
+
+def rest_level(envelope: FloatArray, rate: float, seconds: float) -> FloatArray:
+    """The lowest mean over any stretch of the given length: [channels], in the envelope's unit.
+
+    envelope: [samples, channels]. Raises ValueError where the stretch is longer than the envelope.
+    """
+    window = max(1, round(seconds * rate))
+    if window > len(envelope):
+        raise ValueError(f"rest of {seconds:g} s: longer than the recording of {len(envelope) / rate:g} s")
+    means = uniform_filter1d(envelope, window, axis=0)
+    whole = slice(window // 2, len(envelope) - (window - 1) // 2)
+    lowest: FloatArray = means[whole].min(axis=0)
+    return lowest
+
+
+def normalise(
+    envelope: FloatArray, maximum: FloatArray, rest: FloatArray | float = 0.0
+) -> tuple[FloatArray, list[int]]:
+    """Scale so that `rest` becomes 0 and `maximum` 1, and clip to [0, 1].
+
+    envelope: [samples, channels]; maximum, rest: [channels], in the envelope's unit.
+    Returns the activations [samples, channels], dimensionless, and per channel how many samples
+    exceeded the maximum. Raises ValueError where a maximum is not above its rest level.
+    """
+    span = maximum - rest
+    if not np.all(span > 0):
+        raise ValueError("a maximum is not above its rest level")
+    scaled = (envelope - rest) / span
+    above = (scaled > 1.0).sum(axis=0)
+    return np.clip(scaled, 0.0, 1.0), [int(n) for n in above]
+
+
+def resample(values: FloatArray, rate: float, new_rate: float) -> FloatArray:
+    """Take a signal at another rate, by straight lines between its samples.
+
+    values: [samples, channels] at `rate` (Hz). Returns [new samples, channels] at `new_rate`, from the same first
+    instant to the last that the signal covers. Raises ValueError where the new rate is not above 0.
+    """
+    if not new_rate > 0:
+        raise ValueError(f"rate {new_rate:g} Hz: must be greater than 0")
+    times = np.arange(len(values)) / rate
+    count = int(np.floor(times[-1] * new_rate + 1e-9)) + 1
+    new_times = np.arange(count) / new_rate
+    return np.stack([np.interp(new_times, times, values[:, i]) for i in range(values.shape[1])], axis=1)
+
+
+def _zero_phase(
+    values: FloatArray, rate: float, corner: float, order: int, kind: Literal["lowpass", "highpass"]
+) -> FloatArray:
+    check_filter(len(values), rate, corner, order)
+    half = order // 2
+    # Two passes square the gain: the single pass must have lost only 1.5 dB at the corner. The
+    # bilinear transform maps frequency through tan, so the correction is exact there, up to Nyquist.
+    shift = (np.sqrt(2.0) - 1.0) ** (1.0 / (2 * half))
+    warped = np.tan(np.pi * corner / rate)
+    warped = warped / shift if kind == "lowpass" else warped * shift
+    sections = butter(half, np.arctan(warped) * rate / np.pi, kind, fs=rate, output="sos")
+    # A mirrored end keeps the mean of a rectified signal; a point-mirrored one keeps the slope of a drift.
+    pad = min(len(values) - 1, int(np.ceil(3 * rate / corner)))
+    filtered: FloatArray = sosfiltfilt(
+        sections, values, axis=0, padtype="even" if kind == "lowpass" else "odd", padlen=pad
+    )
+    return filtered
