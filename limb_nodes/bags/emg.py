@@ -1,0 +1,305 @@
+"""From a raw EMG recording to activations between 0 and 1, and into a bag."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+import scipy
+
+from limb_nodes import __version__
+from limb_nodes.bags import envelope as steps
+from limb_nodes.bags.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
+from limb_nodes.bags.recording import Recording
+from limb_nodes.bags.table import ANGLE_UNITS, VOLTAGE_UNITS, FloatArray
+from limb_nodes.bags.types import TOPIC_TYPES, make_message
+from limb_nodes.bags.write import BagWriter
+from limb_nodes.errors import UserError
+
+ENVELOPE_TOPIC = "emg_envelope"
+ANGLE_TOPIC = "reference_angle"
+
+
+@dataclass(frozen=True)
+class EnvelopeOptions:
+    """How raw EMG becomes an envelope; None leaves a step out.
+
+    band: lower and upper edge of the band-pass (Hz). rectify: full-wave rectification.
+    low_pass: corner of the smoothing (Hz). band_order, low_pass_order: even.
+    rest: the quietest stretch of this length (s) is each channel's zero; 0 keeps zero at 0.
+    resample: rate of the result (Hz); None keeps the recording's.
+    maximum: the envelope that counts as 1, by the channel's name in the recording and in its unit; a
+        channel that is not named takes the largest value of its own envelope.
+    channels: the channels to take, each with its new name; empty takes every EMG channel as it is.
+    angles: the same for the columns in degrees or radians.
+    skip: channels to leave out.
+    """
+
+    band: tuple[float, float] | None = DEFAULT_BAND
+    band_order: int = DEFAULT_ORDER
+    rectify: bool = True
+    low_pass: float | None = DEFAULT_LOW_PASS
+    low_pass_order: int = DEFAULT_ORDER
+    rest: float = 0.0
+    resample: float | None = None
+    maximum: Mapping[str, float] = field(default_factory=dict)
+    channels: Mapping[str, str] = field(default_factory=dict)
+    angles: Mapping[str, str] = field(default_factory=dict)
+    skip: Sequence[str] = ()
+
+    def as_mapping(self) -> dict[str, object]:
+        """The options as plain lists, numbers and mappings, for a bag's run_info."""
+        plain = asdict(self)
+        plain["band"] = None if self.band is None else list(self.band)
+        plain["skip"] = list(self.skip)
+        return plain
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What became of one channel.
+
+    column, name: its name in the recording and its new one. maximum, rest: the levels that became 1
+    and 0, in `unit`. clipped: samples above the maximum.
+    """
+
+    column: str
+    name: str
+    unit: str
+    gaps: Gaps
+    maximum: float
+    rest: float
+    clipped: int
+
+
+@dataclass(frozen=True)
+class AngleChannel:
+    """What became of one angle column: its name in the recording and its new one."""
+
+    column: str
+    name: str
+    gaps: Gaps
+
+
+@dataclass(frozen=True)
+class Envelopes:
+    """Normalised envelopes of several muscles, and the joint angles recorded beside them.
+
+    values: [samples, channels], dimensionless, 0 to 1. angles: [samples, angle columns], rad.
+    rate: Hz; sample k belongs to the time k / rate.
+    """
+
+    source: str
+    rate: float
+    channels: tuple[Channel, ...]
+    values: FloatArray
+    angle_channels: tuple[AngleChannel, ...]
+    angles: FloatArray
+    notes: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The channels' new names."""
+        return tuple(channel.name for channel in self.channels)
+
+
+def envelopes(recording: Recording, options: EnvelopeOptions | None = None) -> Envelopes:
+    """Turn a recording's EMG channels into normalised envelopes, and keep its angle columns.
+
+    Raises UserError where a named channel is not there or is no EMG, a channel has no value or no
+    signal, an option is out of range, or the rate is too low for the filters.
+    """
+    options = options or EnvelopeOptions()
+    _check_names(recording, options)
+    _check_numbers(options)
+    chosen, angle_columns = _chosen(recording, options)
+    raw, gaps = _bridged(recording, [column for column, _ in chosen])
+    angles, angle_gaps = _bridged(recording, [column for column, _ in angle_columns])
+    angles *= np.array([ANGLE_UNITS[recording.unit(column)] for column, _ in angle_columns])
+    for i, (column, _) in enumerate(chosen):
+        if np.ptp(raw[:, i]) == 0.0:
+            raise UserError(
+                f"{recording.source}, channel {column}: every sample is {raw[0, i]:g}; "
+                "a channel without a signal cannot be normalised"
+            )
+    signal = _smoothed(recording, raw, options)
+    with _naming(recording, "--rest"):
+        rest = steps.rest_level(signal, recording.rate, options.rest) if options.rest else np.zeros(len(chosen))
+    maximum = np.array([options.maximum.get(column, signal[:, i].max()) for i, (column, _) in enumerate(chosen)])
+    for i, (column, _) in enumerate(chosen):
+        if not maximum[i] > rest[i]:
+            raise UserError(
+                f"{recording.source}, channel {column}: maximum {maximum[i]:g}; "
+                f"must be above the rest level {rest[i]:g}"
+            )
+    values, above = steps.normalise(signal, maximum, rest)
+    rate = recording.rate
+    if options.resample is not None:
+        both = steps.resample(np.hstack([values, angles]), rate, options.resample)
+        values, angles = both[:, : len(chosen)], both[:, len(chosen) :]
+        rate = options.resample
+    channels = tuple(
+        Channel(column, name, recording.unit(column), gaps[i], float(maximum[i]), float(rest[i]), above[i])
+        for i, (column, name) in enumerate(chosen)
+    )
+    angle_channels = tuple(AngleChannel(column, name, angle_gaps[i]) for i, (column, name) in enumerate(angle_columns))
+    notes = recording.notes + _left_out(recording, options)
+    # Serialising a row needs its values side by side in memory.
+    values, angles = np.ascontiguousarray(values), np.ascontiguousarray(angles)
+    return Envelopes(recording.source, rate, channels, values, angle_channels, angles, notes)
+
+
+def _smoothed(recording: Recording, raw: FloatArray, options: EnvelopeOptions) -> FloatArray:
+    """Filter, rectify and smooth: [samples, channels], in the recording's units."""
+    signal = raw
+    if options.band is not None:
+        with _naming(recording, "--band-pass"):
+            signal = steps.band_pass(signal, recording.rate, options.band, options.band_order)
+    if options.rectify:
+        signal = steps.rectify(signal)
+    if options.low_pass is not None:
+        with _naming(recording, "--low-pass"):
+            signal = steps.low_pass(signal, recording.rate, options.low_pass, options.low_pass_order)
+    return signal
+
+
+@contextmanager
+def _naming(recording: Recording, option: str) -> Iterator[None]:
+    """Turn the ValueError of a step into a line that names the recording and the option."""
+    try:
+        yield
+    except ValueError as error:
+        raise UserError(f"{recording.source} ({recording.rate:g} Hz), {option}: {error}") from error
+
+
+def _check_names(recording: Recording, options: EnvelopeOptions) -> None:
+    there = ", ".join(recording.names)
+    named = {
+        "channel": options.channels,
+        "angle": options.angles,
+        "skip": options.skip,
+        "maximum": options.maximum,
+    }
+    for option, names in named.items():
+        for name in names:
+            if name not in recording.names:
+                raise UserError(f"{recording.source}: no column '{name}' (--{option}); there are {there}")
+    for name in options.channels:
+        if recording.unit(name) in ANGLE_UNITS:
+            raise UserError(
+                f"{recording.source}: column '{name}' (--channel) is in {recording.unit(name)}; "
+                "EMG is in V, mV, uV or without a unit, angles belong to --angle"
+            )
+    for name in options.angles:
+        if recording.unit(name) not in ANGLE_UNITS:
+            unit = recording.unit(name) or "has no unit"
+            raise UserError(f"{recording.source}: column '{name}' (--angle): {unit}; must be deg or rad")
+
+
+def _check_numbers(options: EnvelopeOptions) -> None:
+    for name, value in options.maximum.items():
+        if not (np.isfinite(value) and value > 0):
+            raise UserError(f"--maximum {name}={value:g}: must be greater than 0")
+    if not (np.isfinite(options.rest) and options.rest >= 0):
+        raise UserError(f"--rest {options.rest:g}: must be 0 s or more")
+    if options.resample is None:
+        return
+    if not (np.isfinite(options.resample) and options.resample > 0):
+        raise UserError(f"--resample {options.resample:g}: must be greater than 0 Hz")
+    if options.low_pass is not None and options.resample < 2 * options.low_pass:
+        raise UserError(
+            f"--resample {options.resample:g}: must be twice the low-pass of {options.low_pass:g} Hz or more"
+        )
+
+
+def _is_emg(recording: Recording, column: str) -> bool:
+    return recording.unit(column) == "" or recording.unit(column) in VOLTAGE_UNITS
+
+
+def _chosen(recording: Recording, options: EnvelopeOptions) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+    """Pick the EMG and the angle columns, each as (column, new name)."""
+    left = [name for name in recording.names if name not in options.skip]
+    emg = [name for name in left if name in options.channels or (not options.channels and _is_emg(recording, name))]
+    angle = [
+        name for name in left if recording.unit(name) in ANGLE_UNITS and (name in options.angles or not options.angles)
+    ]
+    if not emg:
+        raise UserError(
+            f"{recording.source}: no EMG channel is left of {', '.join(recording.names)}; at least one is needed"
+        )
+    for name in options.maximum:
+        if name not in emg:
+            raise UserError(f"{recording.source}: --maximum {name}: not among the channels taken, {', '.join(emg)}")
+    chosen = [(name, options.channels.get(name, name)) for name in emg]
+    angles = [(name, options.angles.get(name, name)) for name in angle]
+    for kind in (chosen, angles):
+        new = [name for _, name in kind]
+        for name in new:
+            if new.count(name) > 1:
+                raise UserError(f"{recording.source}: two columns would be named '{name}'; names must differ")
+    return chosen, angles
+
+
+def _left_out(recording: Recording, options: EnvelopeOptions) -> tuple[str, ...]:
+    """Say which columns were left out for their unit."""
+    return tuple(
+        f"column '{name}' is in {recording.unit(name)}, neither EMG nor angle: left out"
+        for name in recording.names
+        if recording.unit(name) not in ANGLE_UNITS
+        and not _is_emg(recording, name)
+        and name not in options.channels
+        and name not in options.skip
+    )
+
+
+def _bridged(recording: Recording, columns: Sequence[str]) -> tuple[FloatArray, list[Gaps]]:
+    bridged = np.zeros((len(recording.values), len(columns)))
+    gaps = []
+    for i, column in enumerate(columns):
+        try:
+            bridged[:, i], found = steps.bridge_gaps(recording.values[:, recording.names.index(column)])
+        except ValueError:
+            raise UserError(f"{recording.source}, channel {column}: nothing but missing values") from None
+        gaps.append(found)
+    return bridged, gaps
+
+
+def write_envelopes(found: Envelopes, out: str | Path, options: EnvelopeOptions | None = None) -> None:
+    """Write envelopes to a new bag: `emg_envelope` and, where there are angles, `reference_angle` at every tick.
+
+    Tick k is stamped k times the period, rounded to whole nanoseconds. run_info holds the recording's name, the
+    options, what became of each channel, and versions.
+
+    Raises UserError where the bag cannot be made; nothing is written then.
+    """
+    period = round(1e9 / found.rate)
+    run_info = {
+        "command": "limb emg",
+        "source": found.source,
+        "rate": found.rate,
+        "period_ns": period,
+        "parameters": (options or EnvelopeOptions()).as_mapping(),
+        "channels": [asdict(channel) for channel in found.channels],
+        "angles": [asdict(channel) for channel in found.angle_channels],
+        "notes": list(found.notes),
+        "versions": {"limb_nodes": __version__, "numpy": np.__version__, "scipy": scipy.__version__},
+    }
+    names = list(found.names)
+    angle_names = [channel.name for channel in found.angle_channels]
+    with BagWriter(out, run_info) as bag:
+        for tick, values in enumerate(found.values):
+            stamp = tick * period
+            bag.write(
+                ENVELOPE_TOPIC,
+                stamp,
+                make_message(TOPIC_TYPES[ENVELOPE_TOPIC], stamp, tick=tick, name=names, activation=values),
+            )
+            if angle_names:
+                bag.write(
+                    ANGLE_TOPIC,
+                    stamp,
+                    make_message("sensor_msgs/msg/JointState", stamp, name=angle_names, position=found.angles[tick]),
+                )
