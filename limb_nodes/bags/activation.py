@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from limb_nodes.errors import UserError
 
 # A recorded run holds what drove its muscles on the first topic, a recording of EMG on the second.
 ACTIVATION_TOPICS = ("activation", "emg_envelope")
+MOST_TICKS = 10**8
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Activation:
 
 @dataclass(frozen=True)
 class _Samples:
-    """What a file holds: times [samples] in s from 0, values [samples, names], and how errors name a place."""
+    """What a file holds: times [samples] in s, values [samples, names], and how errors name a place."""
 
     source: str
     times: FloatArray
@@ -66,17 +68,17 @@ def load_activation(source: str, muscles: Sequence[str], rate: float, duration: 
         raise UserError(f"rate {rate:g}: must be greater than 0 Hz")
     if duration is not None:
         _ticks(duration, rate)
-    path = Path(source)
-    if is_bag(path):
+    if is_bag(source):
         return _from_samples(_bag(source), muscles, rate, duration)
-    if not path.exists() and "=" in source:
+    there = os.path.exists(source)
+    if not there and "=" in source:
         return _from_waveforms(source, parse_constants(source), muscles, rate, duration)
-    if not path.exists():
+    if not there:
         raise UserError(
             f"activation '{source}': no such file or folder; must be a bag, a CSV file, a waveform YAML, "
             "or constants such as flexor=0.9,extensor=0"
         )
-    if path.suffix.lower() in {".yaml", ".yml"}:
+    if Path(source).suffix.lower() in {".yaml", ".yml"}:
         return _from_waveforms(source, read_waveforms(source), muscles, rate, duration)
     return _from_samples(_csv(source), muscles, rate, duration)
 
@@ -85,10 +87,16 @@ def _ticks(duration: float, rate: float) -> int:
     """Number of the last tick of a duration that is a whole number of ticks."""
     if not (np.isfinite(duration) and duration > 0):
         raise UserError(f"duration {duration:g}: must be greater than 0 s")
+    _check_count(duration * rate, rate)
     last = round(duration * rate)
     if last < 1 or abs(duration * rate - last) > 1e-6 * max(1.0, last * 1e-6):
         raise UserError(f"duration {duration:g}: must be a whole number of ticks of {1 / rate:g} s (rate {rate:g} Hz)")
     return last
+
+
+def _check_count(ticks: float, rate: float) -> None:
+    if ticks > MOST_TICKS:
+        raise UserError(f"rate {rate:g}: {ticks:.3g} ticks; at most {MOST_TICKS:g} fit in memory")
 
 
 def _from_waveforms(
@@ -103,11 +111,11 @@ def _from_waveforms(
 
 
 def _from_samples(samples: _Samples, muscles: Sequence[str], rate: float, duration: float | None) -> Activation:
-    source, times = samples.source, samples.times
-    later = np.concatenate([[True], np.diff(times) > 0])
+    source, times = samples.source, samples.times - samples.times[0]
+    later = np.concatenate([np.isfinite(times[:1]), np.diff(times) > 0])
     if not later.all():
         row = int(later.argmin())
-        shown = "no value" if np.isnan(times[row]) else f"{times[row]:g} s"
+        shown = "no value" if np.isnan(samples.times[row]) else f"{samples.times[row]:g} s"
         raise UserError(f"{source}, {samples.places[row]}, time: {shown}; must be later than the one before")
     _check_muscles(source, "column", samples.names, muscles)
     values = samples.values[:, [samples.names.index(muscle) for muscle in muscles]]
@@ -118,6 +126,7 @@ def _from_samples(samples: _Samples, muscles: Sequence[str], rate: float, durati
         shown = "no value" if np.isnan(value) else f"{value:g}"
         raise UserError(f"{source}, {samples.places[row]}, {muscles[column]}: {shown}; must be a number in [0, 1]")
     end = float(times[-1])
+    _check_count(end * rate if duration is None else 0.0, rate)
     last = int(np.floor(end * rate + 1e-6)) if duration is None else _ticks(duration, rate)
     if last < 1:
         raise UserError(f"{source}: lasts {end:g} s, less than one tick of {1 / rate:g} s (rate {rate:g} Hz)")
@@ -152,7 +161,7 @@ def _csv(source: str) -> _Samples:
     keep = [i for i in range(len(table.names)) if i != column]
     notes = () if times[0] == 0 else (f"its times start at {times[0]:g} s; counted from there",)
     names = tuple(table.names[i] for i in keep)
-    return _Samples(source, times - times[0], names, table.values[:, keep], places, notes)
+    return _Samples(source, times, names, table.values[:, keep], places, notes)
 
 
 def _bag(source: str) -> _Samples:
@@ -160,4 +169,4 @@ def _bag(source: str) -> _Samples:
     places = [f"topic {series.topic}, tick {tick}" for tick in series.ticks]
     missing = int(series.ticks[-1] - series.ticks[0]) + 1 - len(series.ticks)
     notes = (f"ticks missing on {series.topic}, bridged by straight lines: {missing}",) if missing > 0 else ()
-    return _Samples(source, series.times - series.times[0], series.names, series.values, places, notes)
+    return _Samples(source, series.times, series.names, series.values, places, notes)

@@ -114,7 +114,7 @@ def envelopes(recording: Recording, options: EnvelopeOptions | None = None) -> E
     """
     options = options or EnvelopeOptions()
     _check_names(recording, options)
-    _check_numbers(options)
+    _check_numbers(options, recording.rate)
     chosen, angle_columns = _chosen(recording, options)
     raw, gaps = _bridged(recording, [column for column, _ in chosen])
     angles, angle_gaps = _bridged(recording, [column for column, _ in angle_columns])
@@ -199,7 +199,7 @@ def _check_names(recording: Recording, options: EnvelopeOptions) -> None:
             raise UserError(f"{recording.source}: column '{name}' (--angle): {unit}; must be deg or rad")
 
 
-def _check_numbers(options: EnvelopeOptions) -> None:
+def _check_numbers(options: EnvelopeOptions, rate: float) -> None:
     for name, value in options.maximum.items():
         if not (np.isfinite(value) and value > 0):
             raise UserError(f"--maximum {name}={value:g}: must be greater than 0")
@@ -207,8 +207,10 @@ def _check_numbers(options: EnvelopeOptions) -> None:
         raise UserError(f"--rest {options.rest:g}: must be 0 s or more")
     if options.resample is None:
         return
-    if not (np.isfinite(options.resample) and options.resample > 0):
-        raise UserError(f"--resample {options.resample:g}: must be greater than 0 Hz")
+    if not 0 < options.resample <= 10 * rate:
+        raise UserError(
+            f"--resample {options.resample:g}: must be greater than 0 and at most ten times the rate, {10 * rate:g} Hz"
+        )
     if options.low_pass is not None and options.resample < 2 * options.low_pass:
         raise UserError(
             f"--resample {options.resample:g}: must be twice the low-pass of {options.low_pass:g} Hz or more"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +32,8 @@ class NamedValues:
 
 def is_bag(path: str | Path) -> bool:
     """Whether a path is to be read as a bag: a folder, or the file of messages in one."""
-    return Path(path).is_dir() or Path(path).suffix.lower() in {".mcap", ".db3"}
+    # os.path, because a long line of constants is no path and makes pathlib raise.
+    return os.path.isdir(path) or Path(path).suffix.lower() in {".mcap", ".db3"}
 
 
 def read_named_values(path: str | Path, topics: Sequence[str]) -> NamedValues:

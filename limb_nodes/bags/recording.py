@@ -23,6 +23,7 @@ from limb_nodes.bags.table import (
 from limb_nodes.errors import UserError
 
 RAW_TOPIC = "emg_raw"
+MOST_RATE = 1e6
 
 _CHANNEL = re.compile(
     r"Channel\s+\d+:\s*'(?P<name>[^']*)'\s*,\s*(?P<count>\d+)\s+values\s*,"
@@ -67,8 +68,8 @@ def read_recording(path: str | Path, *, rate: float | None = None, topic: str = 
     Raises UserError where the input cannot be read, its rate is unknown or contradicts its times, or
     its times do not rise evenly.
     """
-    if rate is not None and not (np.isfinite(rate) and rate > 0):
-        raise UserError(f"rate {rate:g}: must be greater than 0 Hz")
+    if rate is not None and not 0 < rate <= MOST_RATE:
+        raise UserError(f"rate {rate:g}: must be greater than 0 Hz and at most {MOST_RATE:g}")
     if is_bag(path):
         return _read_bag(path, rate, topic)
     lines = read_lines(path)

@@ -1,0 +1,247 @@
+"""From a recording to envelopes in a bag: the choice of channels, the options, the command."""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from limb_nodes.bags.activation import load_activation
+from limb_nodes.bags.emg import EnvelopeOptions, envelopes
+from limb_nodes.bags.read import BagReader
+from limb_nodes.bags.recording import Recording
+from limb_nodes.bags.types import make_message
+from limb_nodes.bags.write import BagWriter
+from limb_nodes.commands import emg
+from limb_nodes.errors import UserError
+
+SEATED = Path(__file__).parents[2] / ".." / "shared" / "data" / "emg_lower_limb" / "5Nsen.txt"
+SAMPLES = 2000
+
+
+def recording(**changes) -> Recording:
+    rng = np.random.default_rng(4)
+    values = np.column_stack(
+        [rng.normal(size=SAMPLES), 3 * rng.normal(size=SAMPLES), np.linspace(0, 90, SAMPLES), np.ones(SAMPLES)]
+    )
+    given = {
+        "source": "made.txt",
+        "names": ("RF", "VM", "FX", "force"),
+        "units": ("mV", "uV", "deg", "N"),
+        "values": values,
+        "rate": 1000.0,
+    }
+    return Recording(**{**given, **changes})
+
+
+def limb_emg(*arguments) -> int:
+    parser = argparse.ArgumentParser()
+    emg.add_parser(parser.add_subparsers())
+    return emg.run(parser.parse_args(["emg", *map(str, arguments)]))
+
+
+def test_each_channel_reaches_its_own_maximum_once():
+    found = envelopes(recording())
+    assert found.names == ("RF", "VM")
+    assert found.values.shape == (SAMPLES, 2)
+    np.testing.assert_array_equal(found.values.max(axis=0), [1, 1])
+    assert found.values.min() >= 0
+    # Noise of three times the amplitude has three times the envelope.
+    assert found.channels[1].maximum / found.channels[0].maximum == pytest.approx(3, rel=0.2)
+    assert [channel.clipped for channel in found.channels] == [0, 0]
+
+
+def test_columns_that_are_no_emg_are_kept_as_angles_or_left_out_with_a_note():
+    found = envelopes(recording())
+    assert [channel.name for channel in found.angle_channels] == ["FX"]
+    np.testing.assert_allclose(found.angles[[0, -1], 0], [0, np.pi / 2])
+    assert found.notes == ("column 'force' is in N, neither EMG nor angle: left out",)
+
+
+def test_given_maximum_scales_and_clips():
+    own = envelopes(recording())
+    level = own.channels[0].maximum
+    twice = envelopes(recording(), EnvelopeOptions(maximum={"RF": 2 * level}))
+    np.testing.assert_allclose(twice.values[:, 0], own.values[:, 0] / 2)
+    half = envelopes(recording(), EnvelopeOptions(maximum={"RF": level / 2}))
+    np.testing.assert_allclose(half.values[:, 0], np.minimum(1, 2 * own.values[:, 0]))
+    assert half.channels[0].clipped == (own.values[:, 0] > 0.5).sum() > 0
+
+
+def test_channels_are_selected_and_renamed():
+    options = EnvelopeOptions(channels={"VM": "vastus"}, angles={"FX": "knee"}, skip=("force",))
+    found = envelopes(recording(), options)
+    assert found.names == ("vastus",)
+    assert found.angle_channels[0].name == "knee"
+    np.testing.assert_array_equal(found.values[:, 0], envelopes(recording()).values[:, 1])
+    assert envelopes(recording(), EnvelopeOptions(skip=("RF", "FX"))).names == ("VM",)
+
+
+def test_rest_level_becomes_zero_and_maximum_stays_one():
+    quiet = recording()
+    quiet.values[800:1400, 0] *= 0.1
+    plain = envelopes(quiet).values[:, 0]
+    found = envelopes(quiet, EnvelopeOptions(rest=0.3))
+    rest = plain[900:1300].mean()
+    assert found.channels[0].rest / found.channels[0].maximum == pytest.approx(rest, rel=0.2)
+    assert found.values[900:1300, 0].mean() < 0.02 < rest
+    assert found.values[:, 0].max() == 1.0
+
+
+def test_steps_can_be_left_out():
+    options = EnvelopeOptions(band=None, rectify=False, low_pass=None, maximum={"RF": 2.0})
+    raw = recording()
+    found = envelopes(raw, options)
+    np.testing.assert_allclose(found.values[:, 0], np.clip(raw.values[:, 0] / 2, 0, 1))
+
+
+def test_resampled_envelope_keeps_time_and_angle():
+    plain, slow = envelopes(recording()), envelopes(recording(), EnvelopeOptions(resample=200.0))
+    assert slow.rate == 200.0
+    np.testing.assert_allclose(slow.values, plain.values[::5], atol=1e-12)
+    np.testing.assert_allclose(slow.angles, plain.angles[::5], atol=1e-12)
+
+
+def test_gaps_are_counted_per_channel_and_hardly_matter():
+    raw = recording()
+    raw.values[500:503, 0] = np.nan
+    raw.values[700, 0] = np.nan
+    raw.values[:2, 2] = np.nan
+    found = envelopes(raw)
+    gaps = found.channels[0].gaps
+    assert (gaps.count, gaps.samples, gaps.longest) == (2, 4, 3)
+    assert found.channels[1].gaps.count == 0
+    assert found.angle_channels[0].gaps.samples == 2
+    assert np.isfinite(found.values).all()
+    assert np.abs(found.values - envelopes(recording()).values).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("changes", "options", "words"),
+    [
+        ({}, {"channels": {"XX": "a"}}, "no column 'XX' (--channel); there are RF, VM, FX, force"),
+        ({}, {"skip": ("XX",)}, "no column 'XX' (--skip)"),
+        ({}, {"maximum": {"XX": 1.0}}, "no column 'XX' (--maximum)"),
+        ({}, {"angles": {"XX": "a"}}, "no column 'XX' (--angle)"),
+        ({}, {"channels": {"FX": "a"}}, "column 'FX' (--channel) is in deg"),
+        ({}, {"angles": {"RF": "a"}}, "column 'RF' (--angle): mV; must be deg or rad"),
+        ({}, {"channels": {"RF": "a", "VM": "a"}}, "two columns would be named 'a'"),
+        ({}, {"channels": {"RF": "a"}, "maximum": {"VM": 1.0}}, "--maximum VM: not among the channels taken, RF"),
+        ({}, {"skip": ("RF", "VM")}, "no EMG channel is left"),
+        ({}, {"maximum": {"RF": 0.0}}, "--maximum RF=0: must be greater than 0"),
+        ({}, {"maximum": {"RF": float("nan")}}, "--maximum RF=nan: must be greater than 0"),
+        ({}, {"rest": -1.0}, "--rest -1: must be 0 s or more"),
+        ({}, {"rest": 60.0}, "--rest: rest of 60 s: longer than the recording of 2 s"),
+        ({}, {"rest": 0.5, "maximum": {"RF": 1e-9}}, "channel RF: maximum 1e-09; must be above the rest level"),
+        ({}, {"resample": 0.0}, "--resample 0: must be greater than 0"),
+        ({}, {"resample": 1e15}, "at most ten times the rate, 10000 Hz"),
+        ({}, {"resample": 10.0}, "--resample 10: must be twice the low-pass of 6 Hz or more"),
+        ({"rate": 500.0}, {}, "made.txt (500 Hz), --band-pass: filter corner 450 Hz: must lie between 0 and half"),
+        ({}, {"band": (float("nan"), 450.0)}, "--band-pass: band-pass nan 450 Hz: the lower edge"),
+        ({}, {"low_pass": 0.0}, "--low-pass: filter corner 0 Hz"),
+        ({}, {"band_order": 5}, "--band-pass: filter order 5: must be even"),
+        ({"values": recording().values[:30]}, {}, "--band-pass: 30 samples"),
+        ({"values": np.full((500, 4), np.nan)}, {}, "channel RF: nothing but missing values"),
+        ({"values": np.ones((500, 4))}, {}, "channel RF: every sample is 1"),
+    ],
+)
+def test_bad_options_are_named(changes, options, words):
+    with pytest.raises(UserError) as error:
+        envelopes(recording(**changes), EnvelopeOptions(**options))
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.fixture
+def raw_file(tmp_path):
+    raw = recording()
+    path = tmp_path / "raw.csv"
+    rows = [",".join(f"{value:.6g}" for value in row) for row in raw.values]
+    rows[10] = "," + rows[10].split(",", 1)[1]
+    path.write_text("RF [mV],VM [uV],FX [deg],force [N]\n" + "\n".join(rows) + "\n,,,\n")
+    return path
+
+
+def test_command_writes_every_sample_and_says_what_it_did(raw_file, tmp_path, capsys):
+    out = tmp_path / "env"
+    assert limb_emg(raw_file, "-o", out, "--rate", 1000, "--channel", "RF=flexor", "--angle", "FX=knee") == 0
+    printed = capsys.readouterr().out
+    assert "1 (1 samples)" in printed
+    assert "left out: 1" in printed
+    assert str(out) in printed
+    with BagReader(out) as bag:
+        table = bag.table("emg_envelope")
+        angle = bag.table("reference_angle")
+        info = bag.run_info()
+    assert table["name"].tolist() == ["flexor"]
+    np.testing.assert_array_equal(table["tick"], np.arange(SAMPLES))
+    np.testing.assert_array_equal(table["stamp"], np.arange(SAMPLES) * 1_000_000)
+    assert table["activation"].max() == 1.0
+    assert angle["name"].tolist() == ["knee"]
+    np.testing.assert_allclose(angle["position"][:, 0], np.linspace(0, np.pi / 2, SAMPLES), atol=1e-6)
+    assert info["source"] == str(raw_file)
+    assert info["parameters"]["band"] == [20.0, 450.0]
+    assert info["channels"][0]["gaps"] == {"count": 1, "samples": 1, "longest": 1}
+
+
+def test_bag_of_raw_emg_gives_the_same_envelopes(raw_file, tmp_path):
+    limb_emg(raw_file, "-o", tmp_path / "a", "--rate", 1000, "--skip", "FX")
+    raw = recording().values[:, :2]
+    raw[10, 0] = np.nan
+    with BagWriter(tmp_path / "raw", {}) as bag:
+        for tick, row in enumerate(np.array([[float(f"{v:.6g}") for v in row] for row in raw])):
+            stamp = 5_000_000_000 + tick * 1_000_000
+            message = make_message(
+                "limb_msgs/msg/MuscleActivation", stamp, tick=tick, name=["RF", "VM"], activation=row
+            )
+            bag.write("emg_raw", stamp, message)
+    limb_emg(tmp_path / "raw", "-o", tmp_path / "b")
+    with BagReader(tmp_path / "a") as a, BagReader(tmp_path / "b") as b:
+        np.testing.assert_array_equal(a.table("emg_envelope")["activation"], b.table("emg_envelope")["activation"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--rate", "1000", "--maximum", "RF"], "--maximum RF: must be COLUMN=VALUE"),
+        (["--rate", "1000", "--maximum", "RF=high"], "--maximum RF=high: 'high' is not a number"),
+        (["--rate", "1000", "--channel", "RF", "--channel", "RF=a"], "column 'RF' is named twice"),
+        (["--rate", "1000", "--channel", "RF="], "--channel RF=: must be COLUMN[=NAME]"),
+        (["--rate", "100"], "--band-pass: filter corner 450 Hz"),
+        ([], "give --rate HZ"),
+    ],
+)
+def test_nothing_is_written_where_something_is_wrong(raw_file, tmp_path, arguments, words):
+    with pytest.raises(UserError) as error:
+        limb_emg(raw_file, "-o", tmp_path / "env", *arguments)
+    assert words in str(error.value)
+    assert not (tmp_path / "env").exists()
+
+
+def test_existing_output_is_refused_and_kept(raw_file, tmp_path):
+    (tmp_path / "env").mkdir()
+    (tmp_path / "env" / "mine.txt").write_text("kept")
+    with pytest.raises(UserError, match="exists already"):
+        limb_emg(raw_file, "-o", tmp_path / "env", "--rate", 1000)
+    assert (tmp_path / "env" / "mine.txt").read_text() == "kept"
+
+
+def test_bag_without_the_topic_says_what_there_is(raw_file, tmp_path):
+    limb_emg(raw_file, "-o", tmp_path / "env", "--rate", 1000)
+    with pytest.raises(UserError, match=r"no message on emg_raw; the bag has /emg_envelope, /reference_angle"):
+        limb_emg(tmp_path / "env", "-o", tmp_path / "again")
+
+
+@pytest.mark.skipif(not SEATED.exists(), reason="recording 5Nsen.txt is not in ../shared/data")
+def test_knee_extensors_work_while_the_seated_knee_is_straight(tmp_path):
+    limb_emg(SEATED, "-o", tmp_path / "env")
+    activation = load_activation(str(tmp_path / "env"), ["RF", "VM", "BF", "ST"], 1000.0)
+    assert activation.values.shape == (13480, 4)
+    assert activation.notes == ()
+    np.testing.assert_array_equal(activation.values.max(axis=0), 1.0)
+    with BagReader(tmp_path / "env") as bag:
+        flexion = np.degrees(bag.table("reference_angle")["position"][:, 0])
+    assert flexion.min() == pytest.approx(0.9)
+    assert flexion.max() == pytest.approx(70.6)
+    straight, bent = activation.values[flexion < 15, :2], activation.values[flexion > 60, :2]
+    assert (straight.mean(axis=0) > 4 * bent.mean(axis=0)).all()
