@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag2 import Reader
-from rosbags.rosbag2.errors import ReaderError
 from rosbags.typesys import get_types_from_msg
 from rosbags.typesys.store import Typestore
 from ruamel.yaml import YAML
@@ -47,10 +46,10 @@ class BagReader:
         try:
             self._reader = Reader(self.path)
             self._reader.open()
-        except (ReaderError, OSError, AssertionError, TypeError) as error:
-            if self.path.suffix == ".mcap" and "magic" in str(error):
+        except Exception as error:  # the library has no one class for what damage can do to it
+            if "end magic" in str(error):
                 raise _unfinished(self.path) from None
-            raise UserError(f"{self.path}: not a bag that can be read: {str(error) or 'it is damaged'}") from None
+            raise UserError(f"{self.path}: not a bag that can be read: {_one_line(error)}") from None
         self._topics: dict[str, Connection] = {}
         for connection in self._reader.connections:
             self._topics.setdefault(connection.topic, connection)
@@ -97,7 +96,7 @@ class BagReader:
         """
         connection = self._connection(topic)
         store = self._types(connection)
-        return ((stamp, store.deserialize_cdr(data, connection.msgtype)) for stamp, data in self._raw(connection))
+        return self._decoded(connection, store)
 
     def read_raw(self, topic: str) -> Iterator[tuple[int, bytes]]:
         """As `read_topic`, the messages serialised (CDR), as rclpy publishes them without decoding.
@@ -178,8 +177,23 @@ class BagReader:
         try:
             for _, stamp, data in self._reader.messages(same):
                 yield stamp, data
-        except (ReaderError, OSError) as error:
-            raise UserError(f"{self.path}: the bag is damaged: {error}; try `limb recover {self.path}`") from None
+        except Exception as error:
+            raise self._damaged(error) from None
+
+    def _decoded(self, connection: Connection, store: Typestore) -> Iterator[tuple[int, Any]]:
+        for stamp, data in self._raw(connection):
+            try:
+                message = store.deserialize_cdr(data, connection.msgtype)
+            except Exception as error:
+                raise self._damaged(error) from None
+            yield stamp, message
+
+    def _damaged(self, error: Exception) -> UserError:
+        return UserError(f"{self.path}: the bag is damaged: {_one_line(error)}; try `limb recover {self.path}`")
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()) or "it is damaged"
 
 
 def _unfinished(path: Path) -> UserError:

@@ -10,10 +10,11 @@ from typing import Any
 from mcap.records import Channel, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader
 from rosbags.interfaces import Connection
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2 import Writer
 from rosbags.rosbag2.metadata import parse_qos
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from limb_nodes.bags.write import refuse_existing
+from limb_nodes.bags.write import open_writer, refuse_existing
 from limb_nodes.errors import UserError
 
 
@@ -55,12 +56,11 @@ def recover(bag_dir: str | Path, out_dir: str | Path) -> Recovered:
     if not any(isinstance(record, Message) for file in files for record in _records(file, Recovered(path))):
         raise UserError(f"{source}: nothing to recover: no whole message in it")
     found = Recovered(path)
-    writer = Writer(path, version=Writer.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    writer = open_writer(path, compressed=True)
     try:
-        with writer:
-            for file in files:
-                _copy(file, writer, found)
+        for file in files:
+            _copy(file, writer, found)
+        writer.close()
     except OSError as error:
         raise UserError(f"{path}: the bag can't be written: {error}") from None
     return found
@@ -91,10 +91,19 @@ def _connect(channel: Channel, schema: Schema, writer: Writer) -> Connection:
         channel.topic,
         schema.name,
         msgdef=schema.data.decode(),
-        rihs01=channel.metadata.get("topic_type_hash") or "RIHS01_" + "0" * 64,
+        rihs01=_type_hash(schema),
         serialization_format=channel.message_encoding,
         offered_qos_profiles=qos,
     )
+
+
+def _type_hash(schema: Schema) -> str:
+    """The hash by which ROS 2 tells versions of a type apart; zeros where the definition isn't in .msg syntax."""
+    if schema.encoding != "ros2msg":
+        return "RIHS01_" + "0" * 64
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(schema.data.decode(), schema.name))
+    return store.hash_rihs01(schema.name)
 
 
 def _records(file: Path, found: Recovered) -> Iterator[McapRecord]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import zstandard
 from rosbags.interfaces import (
     Connection,
     Qos,
@@ -30,6 +31,7 @@ from limb_nodes.bags.types import LATCHED, RUN_INFO, TOPIC_TYPES, absolute, limb
 from limb_nodes.errors import UserError
 
 _BATCH = 64
+_ZSTD_LEVEL = 3
 _BACKLOG = 100_000
 
 
@@ -74,14 +76,7 @@ class BagWriter:
         self._closed = False
         text = run_info if isinstance(run_info, str) else _yaml_text(run_info)
 
-        refuse_existing(self.path)
-        self._writer = Writer(self.path, version=Writer.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP)
-        if compressed:
-            self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-        try:
-            self._writer.open()
-        except (OSError, WriterError) as error:
-            raise UserError(f"{self.path}: the folder for the bag can't be made: {error}") from None
+        self._writer = open_writer(self.path, compressed=compressed)
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="bag")
         self._last_flush = float("-inf")
         self.write(RUN_INFO, 0, make_message(TOPIC_TYPES[RUN_INFO], data=text))
@@ -172,8 +167,7 @@ class BagWriter:
         now = time.monotonic()
         if now - self._last_flush >= self._flush_period:
             self._last_flush = now
-            storage = self._writer.storage
-            assert isinstance(storage, McapWriter)
+            storage = _storage(self._writer)
             if storage.chunk.msgs:
                 storage.close_chunk()
             storage.bio.flush()
@@ -187,6 +181,32 @@ def refuse_existing(path: Path) -> None:
     """Raise UserError where a folder that is to be made is there already."""
     if path.exists() or path.is_symlink():
         raise UserError(f"{path}: exists already; give the name of a folder that does not")
+
+
+def open_writer(path: Path, *, compressed: bool) -> Writer:
+    """Make the folder of a bag and the file in it.
+
+    Raises:
+        UserError: the folder exists, or can't be made.
+    """
+    refuse_existing(path)
+    writer = Writer(path, version=Writer.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP)
+    if compressed:
+        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    try:
+        writer.open()
+    except (OSError, WriterError) as error:
+        raise UserError(f"{path}: the folder for the bag can't be made: {error}") from None
+    if compressed:
+        # With a checksum, so that readers notice damage; the library's own compressor writes none.
+        _storage(writer).compressor = zstandard.ZstdCompressor(level=_ZSTD_LEVEL, write_checksum=True).compress
+    return writer
+
+
+def _storage(writer: Writer) -> McapWriter:
+    storage = writer.storage
+    assert isinstance(storage, McapWriter)
+    return storage
 
 
 def _qos(*, latched: bool) -> Qos:
