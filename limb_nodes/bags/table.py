@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from limb_nodes.errors import UserError
+from limb_nodes.model.section import describe
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -63,7 +64,10 @@ def read_table(path: str | Path) -> Table:
         raise UserError(f"{path}: the file is empty; a header line and rows of numbers are needed")
     header = lines[first]
     delimiter = delimiter_of(header)
-    cells = [cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))]
+    try:
+        cells = [cell.strip() for cell in next(csv.reader([header], delimiter=delimiter))]
+    except csv.Error as error:
+        raise UserError(f"{path}, line {first + 1}: not a line of column names ({error})") from None
     if all(_is_number(cell) for cell in cells):
         raise UserError(
             f"{path}, line {first + 1}: numbers where the header is expected; "
@@ -127,13 +131,16 @@ def parse_rows(
     rows: list[list[float]] = []
     numbers: list[int] = []
     reader = csv.reader(lines[start:end], delimiter=delimiter)
-    for row in reader:
-        number = start + reader.line_num
-        cells = row or [""]
-        if len(cells) != width:
-            raise UserError(f"{path}, line {number}: {len(cells)} columns; the header has {width}")
-        rows.append([_number(path, number, name, cell) for name, cell in zip(names, cells, strict=True)])
-        numbers.append(number)
+    try:
+        for row in reader:
+            number = start + reader.line_num
+            cells = row or [""]
+            if len(cells) != width:
+                raise UserError(f"{path}, line {number}: {len(cells)} columns; the header has {width}")
+            rows.append([_number(path, number, name, cell) for name, cell in zip(names, cells, strict=True)])
+            numbers.append(number)
+    except csv.Error as error:
+        raise UserError(f"{path}, line {start + reader.line_num}: not a row of numbers ({error})") from None
     return np.array(rows, dtype=np.float64).reshape(len(rows), width), np.array(numbers, dtype=np.int64)
 
 
@@ -143,9 +150,9 @@ def _number(path: str | Path, line: int, name: str, cell: str) -> float:
     except ValueError:
         if cell.strip().lower() in _MISSING:
             return float("nan")
-        raise UserError(f"{path}, line {line}, column {name}: '{cell.strip()}' is not a number") from None
+        raise UserError(f"{path}, line {line}, column {name}: {describe(cell.strip())} is not a number") from None
     if value in (float("inf"), float("-inf")):
-        raise UserError(f"{path}, line {line}, column {name}: '{cell.strip()}' is not finite")
+        raise UserError(f"{path}, line {line}, column {name}: {describe(cell.strip())} is not finite")
     return value
 
 
