@@ -69,9 +69,7 @@ def check_geometry(file: str, muscle: Muscle, segment: Segment) -> None:
         sarcomere = unit.laws["sarcomere"].values
         series = unit.values["series_sarcomeres"]
         least = series * minimum_sarcomere_length(sarcomere["myosin_length"])
-        most = series * maximum_sarcomere_length(
-            sarcomere["myosin_length"], sarcomere["actin_length"]
-        )
+        most = series * maximum_sarcomere_length(sarcomere["myosin_length"], sarcomere["actin_length"])
         if longest < least or shortest > most:
             optimal = series * optimal_sarcomere_length(sarcomere["actin_length"])
             raise UserError(

@@ -22,9 +22,7 @@ class ChosenLaw:
     place: str
 
 
-def choose_law(
-    section: Section, key: str, process: str, shared: tuple[Parameter, ...] = ()
-) -> ChosenLaw:
+def choose_law(section: Section, key: str, process: str, shared: tuple[Parameter, ...] = ()) -> ChosenLaw:
     """Read the law of a process under `key` of a section.
 
     The value is a mapping with `law` and the law's parameters, or only the law's name.
@@ -33,9 +31,7 @@ def choose_law(
     contract = CONTRACTS[process]
     if not section.has(key):
         section.take(key)
-        chosen = Section(
-            section.file, section.at(key), {"law": contract.absent or contract.default}
-        )
+        chosen = Section(section.file, section.at(key), {"law": contract.absent or contract.default})
     elif isinstance(section.content[key], str):
         chosen = Section(section.file, section.at(key), {"law": section.take(key)})
     else:
@@ -75,9 +71,7 @@ def find_law(section: Section, process: str) -> Law:
         try:
             module = importlib.import_module(module_name.removesuffix(".py"))
         except Exception as problem:
-            section.fail(
-                "law", f"is {name!r}; it cannot be imported: {one_line(problem) or 'error'}"
-            )
+            section.fail("law", f"is {name!r}; it cannot be imported: {one_line(problem) or 'error'}")
     found = getattr(module, attribute, None)
     if not isinstance(found, Law):
         section.fail("law", f"is {name!r}; {attribute} in {module_name} is no law")

@@ -26,9 +26,7 @@ BASE_ANGLE = Parameter(
     minimum=-2 * math.pi,
     maximum=2 * math.pi,
 )
-TIP_TORQUE = Parameter(
-    "tip_torque", "N m", "torque of the environment on the last segment", 0.0, "depends on the run"
-)
+TIP_TORQUE = Parameter("tip_torque", "N m", "torque of the environment on the last segment", 0.0, "depends on the run")
 SEGMENT_PARAMETERS = (
     Parameter("mass", "kg", "mass of the segment, m", above=0.0, maximum=1e4),
     Parameter("length", "m", "distance to the next joint or the tip, l", above=0.0, maximum=100.0),
@@ -68,9 +66,7 @@ ACTIVATION_THRESHOLD = Parameter(
     minimum=0.0,
     below=1.0,
 )
-COUNT = Parameter(
-    "count", "1", "number of such units", 1.0, "depends on the muscle", 1.0, 10000.0, integer=True
-)
+COUNT = Parameter("count", "1", "number of such units", 1.0, "depends on the muscle", 1.0, 10000.0, integer=True)
 ORDER = Parameter("order", "1", "place in the recruitment order, R_F", 0.0, "position in the list")
 ROLES = {"flexor": 1.0, "extensor": -1.0}
 UNIT_LAWS = ("force_length", "force_frequency", "passive_force")
@@ -98,8 +94,7 @@ def with_values(limb: Limb, values: Mapping[str, Any]) -> Limb:
     content = copy.deepcopy(limb.content)
     for place, value in values.items():
         steps: list[str | int] = [
-            int(index) if index else name
-            for name, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", place)
+            int(index) if index else name for name, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", place)
         ]
         target: Any = content
         for step, following in zip(steps[:-1], steps[1:], strict=True):
@@ -125,8 +120,7 @@ def build_limb(content: Any, file: str, text: str) -> Limb:
     sarcomeres = read_named(top, "sarcomeres")
     kinds = read_named(top, "unit_kinds")
     muscles = tuple(
-        read_muscle(section, joints, sarcomeres, kinds)
-        for section in top.sections("muscles", required=False)
+        read_muscle(section, joints, sarcomeres, kinds) for section in top.sections("muscles", required=False)
     )
     refuse_twins(top, "muscles", "name", [muscle.name for muscle in muscles])
     limb = Limb(
@@ -150,24 +144,18 @@ def build_limb(content: Any, file: str, text: str) -> Limb:
 
 def read_segment(section: Section) -> Segment:
     """One entry of `segments`."""
-    values = {
-        parameter.name: needed(section.number(parameter)) for parameter in SEGMENT_PARAMETERS
-    }
+    values = {parameter.name: needed(section.number(parameter)) for parameter in SEGMENT_PARAMETERS}
     joint_range = None
     if section.has("range"):
         joint_range = pair(section.vector("range", 2, None))
         if joint_range[0] >= joint_range[1]:
             section.fail("range", f"is {list(joint_range)}; [lowest, highest] in rad is needed")
         if not joint_range[0] <= values["angle"] <= joint_range[1]:
-            section.fail(
-                "angle", f"is {values['angle']}; a number within range {list(joint_range)} in rad"
-            )
+            section.fail("angle", f"is {values['angle']}; a number within range {list(joint_range)} in rad")
     else:
         section.take("range")
     name = section.text("name")
-    segment = Segment(
-        name=name, joint=section.text("joint", name), joint_range=joint_range, **values
-    )
+    segment = Segment(name=name, joint=section.text("joint", name), joint_range=joint_range, **values)
     section.finish()
     return segment
 
@@ -199,9 +187,7 @@ def read_muscle(
     for rank, (unit, unit_threshold) in enumerate(zip(ordered, thresholds, strict=True)):
         unit.values["unit_threshold"] = unit_threshold
         unit.values["unit_rank"] = rank / max(1, len(ordered) - 1)
-    return Muscle(
-        name, joints.index(joint), role, threshold, laws, tuple(ordered), section.place
-    )
+    return Muscle(name, joints.index(joint), role, threshold, laws, tuple(ordered), section.place)
 
 
 def read_units(
@@ -222,9 +208,7 @@ def read_units(
     count = int(needed(section.number(COUNT)))
     order = needed(section.number(ORDER)) if section.has("order") else float(position)
     section.take("order")
-    values = {
-        parameter.name: needed(section.number(parameter)) for parameter in motor_unit.PARAMETERS
-    }
+    values = {parameter.name: needed(section.number(parameter)) for parameter in motor_unit.PARAMETERS}
     if values["maximum_frequency"] <= values["minimum_frequency"]:
         section.fail(
             "maximum_frequency",

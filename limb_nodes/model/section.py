@@ -48,18 +48,16 @@ class Section:
     `places` names, for keys that were merged in from elsewhere, where they stand.
     """
 
-    def __init__(
-        self, file: str, place: str, content: Any, places: Mapping[str, str] | None = None
-    ) -> None:
+    def __init__(self, file: str, place: str, content: Any, places: Mapping[str, str] | None = None) -> None:
         self.file = file
         self.place = place
+        self.places = dict(places or {})
         if not isinstance(content, Mapping):
             self.fail("", f"is {describe(content)}; a mapping of keys is needed")
         for key in content:
             if not isinstance(key, str):
                 self.fail("", f"has the key {describe(key)}; keys are texts")
         self.content: dict[str, Any] = dict(content)
-        self.places = dict(places or {})
         self._taken: set[str] = set()
 
     def at(self, key: str) -> str:
@@ -128,8 +126,7 @@ class Section:
             isinstance(value, list)
             and len(value) == length
             and all(
-                isinstance(item, int | float) and not isinstance(item, bool) and math.isfinite(item)
-                for item in value
+                isinstance(item, int | float) and not isinstance(item, bool) and math.isfinite(item) for item in value
             )
         )
         if not good:
@@ -149,9 +146,7 @@ class Section:
         if not isinstance(value, list) or (required and not value):
             found = "is missing" if value is None else f"is {describe(value)}"
             self.fail(key, f"{found}; a list of mappings is needed")
-        return [
-            Section(self.file, f"{self.at(key)}[{index}]", item) for index, item in enumerate(value)
-        ]
+        return [Section(self.file, f"{self.at(key)}[{index}]", item) for index, item in enumerate(value)]
 
     def finish(self) -> None:
         """Refuse the keys that nobody took."""

@@ -21,9 +21,7 @@ def first_moment(mass: float, com_distance: float, length: float, distal_mass: f
 
 
 @equation("3.8-3.9", "own_inertia")
-def own_inertia(
-    inertia: float, mass: float, com_distance: float, length: float, distal_mass: float
-) -> float:
+def own_inertia(inertia: float, mass: float, com_distance: float, length: float, distal_mass: float) -> float:
     """Diagonal element a_kk of the inertia matrix (kg m^2)."""
     return inertia + mass * com_distance * com_distance + length * length * distal_mass
 
@@ -41,17 +39,13 @@ def centrifugal_torque(coupling: float, sine: float, segment_velocity: float) ->
 
 
 @equation("3.6 load", "tip_force_torque")
-def tip_force_torque(
-    length: float, cosine: float, sine: float, tip_force_x: float, tip_force_y: float
-) -> float:
+def tip_force_torque(length: float, cosine: float, sine: float, tip_force_x: float, tip_force_y: float) -> float:
     """Torque (N m) on a segment, l_k (u_k x F), by the force on the tip."""
     return length * (cosine * tip_force_y - sine * tip_force_x)
 
 
 @equation("3.7", "gravity_torque")
-def gravity_torque(
-    first_moment: float, cosine: float, sine: float, gravity_x: float, gravity_y: float
-) -> float:
+def gravity_torque(first_moment: float, cosine: float, sine: float, gravity_x: float, gravity_y: float) -> float:
     """Torque (N m) on a segment by gravity."""
     return first_moment * (cosine * gravity_y - sine * gravity_x)
 

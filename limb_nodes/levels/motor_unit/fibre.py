@@ -66,15 +66,11 @@ def fibre_length_norm(
             0.0,
             (fibre_length - minimum_fibre_length) / (optimal_fibre_length - minimum_fibre_length),
         )
-    return (fibre_length - optimal_fibre_length) / (
-        maximum_fibre_length - optimal_fibre_length
-    ) + 1.0
+    return (fibre_length - optimal_fibre_length) / (maximum_fibre_length - optimal_fibre_length) + 1.0
 
 
 @equation("2.21", "frequency_norm")
-def frequency_norm(
-    stimulation_frequency: float, minimum_frequency: float, maximum_frequency: float
-) -> float:
+def frequency_norm(stimulation_frequency: float, minimum_frequency: float, maximum_frequency: float) -> float:
     """Normalised stimulation frequency (1); 0 for a unit that is not recruited."""
     if stimulation_frequency <= 0.0:
         return 0.0

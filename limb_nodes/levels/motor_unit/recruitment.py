@@ -28,9 +28,7 @@ def unit_thresholds(pcsa: Sequence[float], activation_threshold: float) -> list[
 @register
 @law("recruitment", source="report, 2.36 [3]")
 @equation("2.36", "stimulation_frequency")
-def linear(
-    activation: float, unit_threshold: float, minimum_frequency: float, maximum_frequency: float
-) -> float:
+def linear(activation: float, unit_threshold: float, minimum_frequency: float, maximum_frequency: float) -> float:
     """Stimulation frequency (Hz): 0 below the unit's threshold, then linear up to f_max."""
     if activation < unit_threshold or activation <= 0.0:
         return 0.0

@@ -26,18 +26,14 @@ def pennation_angle(muscle_length: float, aponeurosis_length: float, area: float
     lengths cannot span the area.
     """
     spanned = muscle_length * aponeurosis_length
-    return math.atan2(
-        area, math.sqrt(spanned * spanned - area * area) - aponeurosis_length * aponeurosis_length
-    )
+    return math.atan2(area, math.sqrt(spanned * spanned - area * area) - aponeurosis_length * aponeurosis_length)
 
 
 @equation("2.34", "fibre_length")
 def fibre_length(muscle_length: float, aponeurosis_length: float, pennation_angle: float) -> float:
     """Fibre length (m) by the law of cosines."""
     across = aponeurosis_length * math.sin(pennation_angle)
-    return math.sqrt(
-        muscle_length * muscle_length - across * across
-    ) - aponeurosis_length * math.cos(pennation_angle)
+    return math.sqrt(muscle_length * muscle_length - across * across) - aponeurosis_length * math.cos(pennation_angle)
 
 
 @equation("2.40", "aponeurosis_angle")
@@ -61,15 +57,13 @@ def fibre_velocity(
     fibre_angle: float,
 ) -> float:
     """Shortening velocity (m/s) of the fibres, 2.35 with 2.29 put in."""
-    return (
-        aponeurosis_velocity * math.cos(fibre_angle) + muscle_velocity * math.cos(pennation_angle)
-    ) / math.cos(aponeurosis_angle)
+    return (aponeurosis_velocity * math.cos(fibre_angle) + muscle_velocity * math.cos(pennation_angle)) / math.cos(
+        aponeurosis_angle
+    )
 
 
 @equation("2.38", "muscle_force")
-def muscle_force(
-    total_fibre_force: float, pennation_angle: float, aponeurosis_angle: float
-) -> float:
+def muscle_force(total_fibre_force: float, pennation_angle: float, aponeurosis_angle: float) -> float:
     """Force (N) along the line of pull; a muscle-tendon unit cannot push."""
     return max(0.0, total_fibre_force * math.cos(pennation_angle) / math.cos(aponeurosis_angle))
 

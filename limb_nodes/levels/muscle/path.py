@@ -36,9 +36,7 @@ def path_slope(
 ) -> float:
     """Shortening per joint angle, -dl_MT/dalpha (m/rad), the factor of omega in 2.45-2.48."""
     bend = 2.0 * role * moment_arm * math.sin(0.5 * joint_angle)
-    proximal = math.sqrt(
-        moment_arm * moment_arm + proximal_distance * proximal_distance - bend * proximal_distance
-    )
+    proximal = math.sqrt(moment_arm * moment_arm + proximal_distance * proximal_distance - bend * proximal_distance)
     distal = math.sqrt(moment_arm * moment_arm + distal_distance * distal_distance - bend * distal_distance)
     return (
         0.5
@@ -87,9 +85,7 @@ PARAMETERS = (
         below=10.0,
     ),
 )
-GEOMETRY = tuple(
-    equation_of(function) for function in (muscle_tendon_length, path_slope, muscle_tendon_velocity)
-)
+GEOMETRY = tuple(equation_of(function) for function in (muscle_tendon_length, path_slope, muscle_tendon_velocity))
 
 constant_moment_arm = register(
     Law(

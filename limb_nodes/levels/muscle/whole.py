@@ -32,7 +32,4 @@ def muscle_torque(tendon_force: float, moment_arm: float, role: float) -> float:
     return -role * tendon_force * moment_arm
 
 
-EQUATIONS = tuple(
-    equation_of(function)
-    for function in (muscle_length, muscle_velocity, tendon_force, muscle_torque)
-)
+EQUATIONS = tuple(equation_of(function) for function in (muscle_length, muscle_velocity, tendon_force, muscle_torque))

@@ -16,9 +16,7 @@ from limb_nodes.levels.equation import Law, Parameter, equation, equation_of
 
 
 @equation("2.5", "bound_probability")
-def bound_probability(
-    phosphate_release_rate: float, phosphate_binding_rate: float, phosphate: float
-) -> float:
+def bound_probability(phosphate_release_rate: float, phosphate_binding_rate: float, phosphate: float) -> float:
     """Steady-state probability (1) of the strongly bound state."""
     return phosphate_release_rate / (phosphate_release_rate + phosphate_binding_rate * phosphate)
 
@@ -55,17 +53,13 @@ def adp_inhibition_constant(adp_release_rate: float, adp_binding_rate: float) ->
 
 
 @equation("2.7", "michaelis_constant")
-def michaelis_constant(
-    unhindered_michaelis_constant: float, adp: float, adp_inhibition_constant: float
-) -> float:
+def michaelis_constant(unhindered_michaelis_constant: float, adp: float, adp_inhibition_constant: float) -> float:
     """Michaelis constant (M) of the shortening velocity."""
     return unhindered_michaelis_constant * (1.0 + adp / adp_inhibition_constant)
 
 
 @equation("2.6", "maximum_sarcomere_velocity")
-def maximum_sarcomere_velocity(
-    saturated_velocity: float, atp: float, michaelis_constant: float
-) -> float:
+def maximum_sarcomere_velocity(saturated_velocity: float, atp: float, michaelis_constant: float) -> float:
     """Greatest shortening velocity (m/s)."""
     return saturated_velocity * atp / (michaelis_constant + atp)
 
@@ -93,16 +87,10 @@ def sarcomere_force(
     if sarcomere_velocity_norm > 0.0:
         detached = math.exp(-0.15 / sarcomere_velocity_norm)
         strain = sarcomere_velocity_norm / 0.15 - detached / (1.0 - detached)
-        return (
-            maximum_sarcomere_force
-            * (1.0 - detached)
-            * (1.0 - elasticity * strain - sarcomere_velocity_norm)
-        )
+        return maximum_sarcomere_force * (1.0 - detached) * (1.0 - elasticity * strain - sarcomere_velocity_norm)
     lengthening = -sarcomere_velocity_norm
     half_velocity = (eccentric_plateau - 1.0) / (1.0 + elasticity / 0.15)
-    return maximum_sarcomere_force * (
-        1.0 + (eccentric_plateau - 1.0) * lengthening / (lengthening + half_velocity)
-    )
+    return maximum_sarcomere_force * (1.0 + (eccentric_plateau - 1.0) * lengthening / (lengthening + half_velocity))
 
 
 derenyi_vicsek = register(

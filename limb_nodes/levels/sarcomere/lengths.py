@@ -46,6 +46,5 @@ PARAMETERS = (
     ),
 )
 EQUATIONS = tuple(
-    equation_of(function)
-    for function in (optimal_sarcomere_length, maximum_sarcomere_length, minimum_sarcomere_length)
+    equation_of(function) for function in (optimal_sarcomere_length, maximum_sarcomere_length, minimum_sarcomere_length)
 )

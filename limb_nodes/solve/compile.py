@@ -1,0 +1,67 @@
+"""The compiled program of a limb, kept on disk between processes."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from types import ModuleType
+
+import numba
+
+from limb_nodes.model.layout import Layout
+from limb_nodes.solve import chain
+from limb_nodes.solve.generate import program
+
+CHAIN_IMPORT = "from limb_nodes.solve.chain import acceleration, impact, reaction\n\n\n"
+
+
+def cache_folder() -> Path:
+    """Where compiled programs are kept: LIMB_CACHE_DIR, or the user's cache folder."""
+    given = os.environ.get("LIMB_CACHE_DIR")
+    if given:
+        return Path(given)
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    folder = Path(base) / "limb_nodes"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return Path(tempfile.gettempdir()) / f"limb_nodes-{os.getuid()}"
+    return folder
+
+
+@cache
+def static_sources() -> tuple[str, str]:
+    """Text of the entry points, and a text that changes with all other code that is compiled in."""
+    entries = resources.files("limb_nodes.solve").joinpath("entries.py.in").read_text("utf-8")
+    chain_file = chain.__file__
+    assert chain_file is not None
+    return entries, Path(chain_file).read_text("utf-8") + numba.__version__
+
+
+def compiled(layout: Layout) -> ModuleType:
+    """The module of a limb's program; limbs of the same structure share one."""
+    entries, other = static_sources()
+    text = program(layout, CHAIN_IMPORT + entries)
+    name = "limb_program_" + hashlib.sha256((text + other).encode()).hexdigest()[:20]
+    if name in sys.modules:
+        return sys.modules[name]
+    path = cache_folder() / f"{name}.py"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Written aside and renamed, so that no other process reads half a file.
+        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.replace(temporary, path)
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module

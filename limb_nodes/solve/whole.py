@@ -1,0 +1,211 @@
+"""The whole-model solve: one system of differential equations, no ROS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+
+from limb_nodes.errors import UserError
+from limb_nodes.model.layout import FloatArray, Layout, build_layout
+from limb_nodes.model.limb import Limb
+from limb_nodes.solve import explicit
+from limb_nodes.solve.compile import compiled
+from limb_nodes.solve.generate import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+
+ANGLE_SCALE, VELOCITY_SCALE = 1.0, 10.0
+TOLERANCE = 1e-9
+FAILURES = {
+    explicit.TOO_MANY_STEPS: "it needs too many steps",
+    explicit.STEP_TOO_SMALL: "the step became too small",
+    explicit.NOT_FINITE: "a rate is not a finite number",
+}
+
+
+class SolveError(UserError):
+    """The equations could not be solved further; says when and why."""
+
+
+@dataclass(frozen=True)
+class Movement:
+    """A solved movement of T instants, n joints.
+
+    time: s [T]. angle, velocity, acceleration: rad, rad/s, rad/s^2 [T, n].
+    internal: internal states [T, states], named by `state_names`.
+    excitation: [T, muscles]. steps: accepted and rejected steps of the integrator.
+    muscle: by name of `MUSCLE_OUTPUTS` [T, muscles]. unit: by name of `UNIT_OUTPUTS` [T, units].
+    """
+
+    time: FloatArray
+    angle: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    internal: FloatArray
+    state_names: tuple[str, ...]
+    excitation: FloatArray
+    muscle: dict[str, FloatArray]
+    unit: dict[str, FloatArray]
+    steps: tuple[int, int]
+
+
+class WholeModel:
+    """A limb ready to be solved.
+
+    limits: offset of the joint limits in the parameters. state_scale: [2 n + internal states].
+    """
+
+    def __init__(self, limb: Limb) -> None:
+        self.limb = limb
+        self.layout: Layout = build_layout(limb)
+        self.program: ModuleType = compiled(self.layout)
+        n = self.layout.joints
+        self.limit_offset = 3 + n * n + 2 * n
+        self.state_scale: FloatArray = np.concatenate(
+            [
+                np.full(n, ANGLE_SCALE),
+                np.full(n, VELOCITY_SCALE),
+                self.layout.state_scales,
+            ]
+        )
+
+    def initial_state(self) -> FloatArray:
+        """Joint angles, joint velocities and internal states at the start."""
+        segments = self.limb.segments
+        return np.concatenate(
+            [
+                [segment.angle for segment in segments],
+                [segment.velocity for segment in segments],
+                self.layout.initial_states,
+            ]
+        )
+
+    def context(self, start: float, period: float) -> FloatArray:
+        """Fresh scratch with the limb's load, for input samples every `period` s from `start`."""
+        c = np.zeros(self.program.CONTEXT)
+        c[:5] = [start, period, *self.limb.tip_force, self.limb.tip_torque]
+        return c
+
+    def drives(self, excitation: FloatArray) -> FloatArray:
+        """What the input does to muscles and motor units [T, drives], at least two rows."""
+        given = np.ascontiguousarray(excitation, dtype=np.float64)
+        if len(given) == 1:
+            given = np.repeat(given, 2, axis=0)
+        out = np.zeros((len(given), self.layout.drives))
+        self.program.drives(given, self.layout.parameters, self.layout.index, out)
+        return out
+
+    def simulate(
+        self,
+        excitation: FloatArray,
+        rate: float,
+        *,
+        tolerance: float = TOLERANCE,
+        observe: bool = True,
+    ) -> Movement:
+        """Solve over the span of an input.
+
+        excitation: [T, muscles], sampled at `rate` Hz from t = 0; what it does to the motor units
+            is linear between samples.
+        tolerance: of the local error, relative to the state or its typical size.
+        observe: whether to fill in what muscles and motor units show.
+        Raises SolveError where the equations cannot be solved further.
+        """
+        count = len(excitation)
+        period = 1.0 / rate
+        times = np.arange(count) * period
+        u = self.drives(excitation)
+        y = self.initial_state()
+        out = np.empty((count, y.size))
+        c = self.context(0.0, period)
+        progress = np.zeros(4)
+        layout, program = self.layout, self.program
+        status = explicit.integrate(
+            program.rates,
+            program.reactions,
+            program.strike,
+            0.0,
+            times[-1],
+            y,
+            times,
+            out,
+            self.state_scale,
+            layout.parameters,
+            layout.index,
+            u,
+            c,
+            layout.joints,
+            self.limit_offset,
+            program.LOCKED,
+            kinks(u, period),
+            tolerance,
+            0.1,
+            progress,
+        )
+        if status != explicit.DONE:
+            raise SolveError(f"{self.limb.file}: the solution stops at {progress[2]:.6g} s: {FAILURES[status]}")
+        return self.movement(times, out, excitation, u, c, progress, observe)
+
+    def movement(
+        self,
+        times: FloatArray,
+        states: FloatArray,
+        excitation: FloatArray,
+        u: FloatArray,
+        c: FloatArray,
+        progress: FloatArray,
+        observe: bool,
+    ) -> Movement:
+        """Accelerations and outputs of solved states."""
+        layout, program = self.layout, self.program
+        n, count = layout.joints, len(times)
+        acceleration = np.empty((count, n))
+        limits = layout.parameters[self.limit_offset : self.limit_offset + 2 * n]
+        program.accelerations(
+            times,
+            states,
+            layout.parameters,
+            layout.index,
+            u,
+            c,
+            limits[:n],
+            limits[n:],
+            acceleration,
+        )
+        muscle = np.zeros((count, layout.muscles, len(MUSCLE_OUTPUTS)))
+        unit = np.zeros((count, layout.units, len(UNIT_OUTPUTS)))
+        if observe and layout.muscles:
+            program.observe_all(
+                states,
+                np.ascontiguousarray(excitation, dtype=np.float64),
+                layout.parameters,
+                layout.index,
+                c,
+                muscle,
+                unit,
+            )
+        return Movement(
+            time=times,
+            angle=states[:, :n],
+            velocity=states[:, n : 2 * n],
+            acceleration=acceleration,
+            internal=states[:, 2 * n :],
+            state_names=layout.state_names,
+            excitation=excitation,
+            muscle={name: muscle[:, :, i] for i, name in enumerate(MUSCLE_OUTPUTS)},
+            unit={name: unit[:, :, i] for i, name in enumerate(UNIT_OUTPUTS)},
+            steps=(int(progress[0]), int(progress[1])),
+        )
+
+
+def kinks(u: FloatArray, period: float) -> FloatArray:
+    """Times of the input samples at which a drive changes its slope sharply.
+
+    A step of high order must not cross such a time: it would not notice. A drive that bends
+    smoothly has second differences of the order of the period squared.
+    """
+    if len(u) < 3 or u.shape[1] == 0:
+        return np.empty(0)
+    bend = np.abs(np.diff(u, n=2, axis=0))
+    sharp = (bend > 1e-3).any(axis=1)
+    return (np.flatnonzero(sharp) + 1) * period
