@@ -114,6 +114,6 @@ class TestPrefix:
                 np.testing.assert_array_equal(table[name][:, 0], [[0.1 * k, -1.0, 2.0] for k in range(5)])
             elif isinstance(detail[0], tuple) and detail[0][1] == ("string", 0):
                 assert list(table[name]) == ["a", "bcd", "ef"]
-            elif name != "header":
+            elif isinstance(detail[0], tuple) and detail[0][1] == ("float64", 0):
                 np.testing.assert_array_equal(table[name], [[0.1 * k, -1.0, 2.0] for k in range(5)])
                 np.testing.assert_array_equal(table[name], [getattr(row, name) for row in rows])
