@@ -88,12 +88,13 @@ def test_table_holds_every_field(run: Path) -> None:
     np.testing.assert_array_equal(movement["position"][7, 2], [7.0, 14.0, 0.0])
 
 
-@pytest.mark.parametrize("topic", sorted(TOPIC_TYPES))
+@pytest.mark.parametrize(
+    "topic",
+    sorted(topic for topic, kind in TOPIC_TYPES.items() if kind.split("/")[0] not in ("diagnostic_msgs", "std_msgs")),
+)
 def test_table_agrees_with_the_messages(topic: str, tmp_path: Path) -> None:
-    """For every topic of a limb whose messages have a place in a table, with texts of every alignment."""
+    """For every topic of a limb that holds numbers, with texts of every alignment."""
     msgtype = TOPIC_TYPES[topic]
-    if msgtype.startswith(("diagnostic_msgs/", "std_msgs/")):
-        pytest.skip("texts only")
     rng = np.random.default_rng(5)
     fields = limb_typestore().fielddefs[msgtype][1]
     with BagWriter(tmp_path / "run", INFO) as bag:
