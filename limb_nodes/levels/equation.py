@@ -106,7 +106,8 @@ class State:
 
     name: the variable; rate: the variable that holds its rate of change.
     number: the number of the differential equation in the report.
-    initial: name of the law's parameter that holds the initial value.
+    initial: name of the law's parameter that holds the initial value, or of a variable that the law
+        defines by parameters alone.
     scale: typical magnitude in SI units, against which the integrators weigh its error.
     """
 

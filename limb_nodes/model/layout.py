@@ -307,7 +307,8 @@ class Packer:
         """Append the states of a system; the offset of the first."""
         offset = len(self.initial)
         for state, process in system.states:
-            self.initial.append(values[f"{process}__{state.initial}"])
+            parameter = f"{process}__{state.initial}"
+            self.initial.append(values[parameter if parameter in values else state.initial])
             self.names.append(f"{owner}.{state.name}")
             self.scales.append(state.scale)
         return offset

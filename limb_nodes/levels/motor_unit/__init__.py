@@ -1,13 +1,26 @@
 """Level of the motor unit: from activation, fibre length and velocity to the force of the unit."""
 
-from limb_nodes.levels.motor_unit import force_frequency, force_length, passive_force, recruitment
+from limb_nodes.levels.motor_unit import (
+    activation_frequency,
+    exponential_passive_force,
+    force_frequency,
+    force_length,
+    fuglevand,
+    gordon_huxley_julian,
+    passive_force,
+    recruitment,
+)
 from limb_nodes.levels.motor_unit.fibre import EQUATIONS, PARAMETERS
 
 __all__ = [
     "EQUATIONS",
     "PARAMETERS",
+    "activation_frequency",
+    "exponential_passive_force",
     "force_frequency",
     "force_length",
+    "fuglevand",
+    "gordon_huxley_julian",
     "passive_force",
     "recruitment",
 ]

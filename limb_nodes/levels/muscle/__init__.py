@@ -1,6 +1,25 @@
 """Level of the muscle, with its sub-levels tendon and aponeurosis."""
 
-from limb_nodes.levels.muscle import activation_dynamics, aponeurosis, path, tendon
+from limb_nodes.levels.muscle import (
+    activation_dynamics,
+    aponeurosis,
+    constant_thickness,
+    first_order,
+    geometric_path,
+    path,
+    tendon,
+    toe_region,
+)
 from limb_nodes.levels.muscle.whole import EQUATIONS
 
-__all__ = ["EQUATIONS", "activation_dynamics", "aponeurosis", "path", "tendon"]
+__all__ = [
+    "EQUATIONS",
+    "activation_dynamics",
+    "aponeurosis",
+    "constant_thickness",
+    "first_order",
+    "geometric_path",
+    "path",
+    "tendon",
+    "toe_region",
+]

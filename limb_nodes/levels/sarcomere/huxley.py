@@ -1,0 +1,296 @@
+"""Huxley's two-state cross-bridges in Zahalak's distribution-moment approximation.
+
+Bonds of length x (in units of the reach h) between myosin and actin are made at the rate f(x) and
+broken at g(x). Zahalak takes their distribution for a normal one, of which the first three moments
+are the states of the law: Q_0 (stiffness), Q_1 (force), Q_2 (elastic energy).
+
+Symbols of the paper: Q_i bond_moment_i, u bond_velocity, f_1 attachment, g_1 detachment,
+g_2 release, g_3 overstretch, h reach. Half a sarcomere shortens at half its velocity.
+"""
+
+import math
+
+from limb_nodes.levels.contracts import register
+from limb_nodes.levels.equation import Law, Parameter, State, equation, equation_of
+from limb_nodes.levels.sarcomere.bond_moments import loss_0, loss_1, loss_2
+
+# Bonds just made, as a share of all sites, that are always counted in: the mean length of no bonds
+# at all would be 0/0. Just made, they have the moments 1, 2/3 and 1/2 of f.
+FRESH = 1e-8
+STEPS = 7.0
+
+
+@equation("P_0", "maximum_sarcomere_force")
+def maximum_sarcomere_force(maximum_force: float) -> float:
+    """Isometric force (N)."""
+    return maximum_force
+
+
+@equation("u", "bond_velocity")
+def bond_velocity(sarcomere_velocity: float, reach: float) -> float:
+    """Shortening velocity (1/s) of half a sarcomere in units of the reach."""
+    return 0.5 * sarcomere_velocity / reach
+
+
+@equation("p", "bond_mean")
+def bond_mean(bond_moment_0: float, bond_moment_1: float) -> float:
+    """Mean length (1) of the bonds, Q_1/Q_0."""
+    return (bond_moment_1 + FRESH * 2.0 / 3.0) / (max(0.0, bond_moment_0) + FRESH)
+
+
+@equation("q", "bond_deviation")
+def bond_deviation(bond_moment_0: float, bond_moment_2: float, bond_mean: float) -> float:
+    """Standard deviation (1) of the bonds' length, sqrt(Q_2/Q_0 - p^2)."""
+    square = (bond_moment_2 + FRESH * 0.5) / (max(0.0, bond_moment_0) + FRESH)
+    return math.sqrt(max(1e-6, square - bond_mean * bond_mean))
+
+
+@equation("dQ_0/dt", "bond_moment_0_rate")
+def bond_moment_0_rate(
+    bond_moment_0: float,
+    bond_mean: float,
+    bond_deviation: float,
+    attachment: float,
+    detachment: float,
+    release: float,
+    overstretch: float,
+) -> float:
+    """Rate (1/s) of the number of bonds: b_0 - F_0."""
+    lost = loss_0(bond_mean, bond_deviation, attachment, detachment, release, overstretch)
+    return attachment / 2.0 - bond_moment_0 * lost
+
+
+@equation("dQ_1/dt", "bond_moment_1_rate")
+def bond_moment_1_rate(
+    bond_moment_0: float,
+    bond_mean: float,
+    bond_deviation: float,
+    bond_velocity: float,
+    attachment: float,
+    detachment: float,
+    release: float,
+    overstretch: float,
+) -> float:
+    """Rate (1/s) of the bonds' summed length: b_1 - F_1 - u Q_0."""
+    lost = loss_1(bond_mean, bond_deviation, attachment, detachment, release, overstretch)
+    return attachment / 3.0 - bond_moment_0 * (lost + bond_velocity)
+
+
+@equation("dQ_2/dt", "bond_moment_2_rate")
+def bond_moment_2_rate(
+    bond_moment_0: float,
+    bond_moment_1: float,
+    bond_mean: float,
+    bond_deviation: float,
+    bond_velocity: float,
+    attachment: float,
+    detachment: float,
+    release: float,
+    overstretch: float,
+) -> float:
+    """Rate (1/s) of the bonds' summed squared length: b_2 - F_2 - 2 u Q_1."""
+    lost = loss_2(bond_mean, bond_deviation, attachment, detachment, release, overstretch)
+    return attachment / 4.0 - bond_moment_0 * lost - 2.0 * bond_velocity * bond_moment_1
+
+
+def misfit_1(mean: float, variance: float, f1: float, g1: float, g2: float, g3: float) -> float:
+    """Zero where a distribution keeps its mean in isometry: F_1/F_0 = b_1/b_0."""
+    deviation = math.sqrt(variance)
+    return loss_1(mean, deviation, f1, g1, g2, g3) - loss_0(mean, deviation, f1, g1, g2, g3) * 2.0 / 3.0
+
+
+def misfit_2(mean: float, variance: float, f1: float, g1: float, g2: float, g3: float) -> float:
+    """Zero where a distribution keeps its second moment in isometry: F_2/F_0 = b_2/b_0."""
+    deviation = math.sqrt(variance)
+    return loss_2(mean, deviation, f1, g1, g2, g3) - loss_0(mean, deviation, f1, g1, g2, g3) * 0.5
+
+
+def newton_part(wanted: float, mean: float, variance: float, f1: float, g1: float, g2: float, g3: float) -> float:
+    """Newton's step of the mean (`wanted` 0) or of the variance (1) towards the steady state."""
+    d = 1e-5
+    one = misfit_1(mean, variance, f1, g1, g2, g3)
+    two = misfit_2(mean, variance, f1, g1, g2, g3)
+    one_mean = (misfit_1(mean + d, variance, f1, g1, g2, g3) - misfit_1(mean - d, variance, f1, g1, g2, g3)) / (2.0 * d)
+    two_mean = (misfit_2(mean + d, variance, f1, g1, g2, g3) - misfit_2(mean - d, variance, f1, g1, g2, g3)) / (2.0 * d)
+    one_var = (misfit_1(mean, variance + d, f1, g1, g2, g3) - misfit_1(mean, variance - d, f1, g1, g2, g3)) / (2.0 * d)
+    two_var = (misfit_2(mean, variance + d, f1, g1, g2, g3) - misfit_2(mean, variance - d, f1, g1, g2, g3)) / (2.0 * d)
+    determinant = one_mean * two_var - one_var * two_mean
+    if wanted < 0.5:
+        return (one_var * two - two_var * one) / determinant
+    return (two_mean * one - one_mean * two) / determinant
+
+
+def settled(
+    wanted: float, steps: float, mean: float, variance: float, f1: float, g1: float, g2: float, g3: float
+) -> float:
+    """Mean (`wanted` 0) or variance (1) of the isometric bonds, `steps` of Newton from a guess."""
+    if steps < 0.5:
+        return mean if wanted < 0.5 else variance
+    mean_step = newton_part(0.0, mean, variance, f1, g1, g2, g3)
+    variance_step = newton_part(1.0, mean, variance, f1, g1, g2, g3)
+    return settled(
+        wanted,
+        steps - 1.0,
+        min(0.95, max(0.05, mean + mean_step)),
+        min(0.5, max(0.01, variance + variance_step)),
+        f1,
+        g1,
+        g2,
+        g3,
+    )
+
+
+@equation("p, isometric", "isometric_mean")
+def isometric_mean(attachment: float, detachment: float, release: float, overstretch: float) -> float:
+    """Mean length (1) of the bonds in isometry, from the exact 1/2 of Huxley's distribution on."""
+    return settled(0.0, STEPS, 0.5, 1.0 / 12.0, attachment, detachment, release, overstretch)
+
+
+@equation("q^2, isometric", "isometric_variance")
+def isometric_variance(attachment: float, detachment: float, release: float, overstretch: float) -> float:
+    """Variance (1) of the bonds' length in isometry."""
+    return settled(1.0, STEPS, 0.5, 1.0 / 12.0, attachment, detachment, release, overstretch)
+
+
+@equation("Q_0, isometric", "isometric_moment_0")
+def isometric_moment_0(
+    isometric_mean: float,
+    isometric_variance: float,
+    attachment: float,
+    detachment: float,
+    release: float,
+    overstretch: float,
+) -> float:
+    """Share (1) of the sites with a bond in isometry, b_0 Q_0/F_0."""
+    deviation = math.sqrt(isometric_variance)
+    return attachment / 2.0 / loss_0(isometric_mean, deviation, attachment, detachment, release, overstretch)
+
+
+@equation("Q_1, isometric", "isometric_moment_1")
+def isometric_moment_1(isometric_moment_0: float, isometric_mean: float) -> float:
+    """First moment (1) of the bonds in isometry."""
+    return isometric_moment_0 * isometric_mean
+
+
+@equation("Q_0, start", "initial_moment_0")
+def initial_moment_0(initial_bonds: float, isometric_moment_0: float) -> float:
+    """Q_0 (1) at the start."""
+    return initial_bonds * isometric_moment_0
+
+
+@equation("Q_1, start", "initial_moment_1")
+def initial_moment_1(initial_bonds: float, isometric_moment_1: float) -> float:
+    """Q_1 (1) at the start."""
+    return initial_bonds * isometric_moment_1
+
+
+@equation("Q_2, start", "initial_moment_2")
+def initial_moment_2(
+    initial_bonds: float, isometric_moment_0: float, isometric_mean: float, isometric_variance: float
+) -> float:
+    """Q_2 (1) at the start."""
+    return initial_bonds * isometric_moment_0 * (isometric_mean * isometric_mean + isometric_variance)
+
+
+@equation("Q_1 to force", "sarcomere_force")
+def sarcomere_force(bond_moment_1: float, isometric_moment_1: float, maximum_force: float) -> float:
+    """Force (N): the bonds are springs, so it goes with their summed length."""
+    return maximum_force * bond_moment_1 / isometric_moment_1
+
+
+huxley = register(
+    Law(
+        "sarcomere",
+        "huxley",
+        tuple(
+            equation_of(function)
+            for function in (
+                maximum_sarcomere_force,
+                isometric_mean,
+                isometric_variance,
+                isometric_moment_0,
+                isometric_moment_1,
+                initial_moment_0,
+                initial_moment_1,
+                initial_moment_2,
+                bond_velocity,
+                bond_mean,
+                bond_deviation,
+                bond_moment_0_rate,
+                bond_moment_1_rate,
+                bond_moment_2_rate,
+                sarcomere_force,
+            )
+        ),
+        (
+            Parameter(
+                "maximum_force",
+                "N",
+                "isometric force",
+                9.7778e-13,
+                "report, 2.4 with the values of rabbit psoas",
+                above=0.0,
+            ),
+            Parameter(
+                "reach",
+                "m",
+                "greatest distance at which a bond is made, h",
+                15.6e-9,
+                "Huxley, Prog Biophys 7 (1957) 255",
+                above=1e-10,
+                below=1e-6,
+            ),
+            Parameter(
+                "attachment",
+                "1/s",
+                "rate of making bonds at the reach, f_1",
+                43.3,
+                "Huxley 1957, frog at 0 C",
+                minimum=0.1,
+                maximum=1e5,
+            ),
+            Parameter(
+                "detachment",
+                "1/s",
+                "rate of breaking bonds at the reach, g_1",
+                10.0,
+                "Huxley 1957, frog at 0 C",
+                minimum=0.1,
+                maximum=1e5,
+            ),
+            Parameter(
+                "release",
+                "1/s",
+                "rate of breaking bonds that pull backwards, g_2",
+                209.0,
+                "Huxley 1957, frog at 0 C",
+                minimum=0.1,
+                maximum=1e5,
+            ),
+            Parameter(
+                "overstretch",
+                "1/s",
+                "further rate of breaking bonds per length beyond the reach, g_3",
+                30.0,
+                "estimate: at most 1.8 times the isometric force in stretch (Katz 1939); 0 in Huxley 1957, 3.7 times",
+                minimum=0.0,
+                maximum=1e5,
+            ),
+            Parameter(
+                "initial_bonds",
+                "1",
+                "bonds at the start over those in isometry; 0: all are still to be made",
+                1.0,
+                "depends on the run",
+                minimum=0.0,
+                maximum=2.0,
+            ),
+        ),
+        states=(
+            State("bond_moment_0", "bond_moment_0_rate", "dQ_0/dt", "initial_moment_0", 0.5),
+            State("bond_moment_1", "bond_moment_1_rate", "dQ_1/dt", "initial_moment_1", 0.5),
+            State("bond_moment_2", "bond_moment_2_rate", "dQ_2/dt", "initial_moment_2", 0.5),
+        ),
+        source="Zahalak, Math Biosci 55 (1981) 89, after Huxley, Prog Biophys 7 (1957) 255",
+    )
+)
