@@ -18,7 +18,10 @@ from limb_nodes.model.layout import Layout
 from limb_nodes.solve import chain
 from limb_nodes.solve.generate import program
 
-CHAIN_IMPORT = "from limb_nodes.solve.chain import acceleration, impact, reaction\n\n\n"
+IMPORTS = (
+    "from limb_nodes.solve.chain import acceleration, impact, reaction\n"
+    "from limb_nodes.solve.pointer import SIGNATURE\n\n\n"
+)
 
 
 def cache_folder() -> Path:
@@ -47,7 +50,7 @@ def static_sources() -> tuple[str, str]:
 def compiled(layout: Layout) -> ModuleType:
     """The module of a limb's program; limbs of the same structure share one."""
     entries, other = static_sources()
-    text = program(layout, CHAIN_IMPORT + entries)
+    text = program(layout, IMPORTS + entries)
     name = "limb_program_" + hashlib.sha256((text + other).encode()).hexdigest()[:20]
     if name in sys.modules:
         return sys.modules[name]

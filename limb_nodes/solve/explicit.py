@@ -11,9 +11,10 @@ import math
 import numpy as np
 from numba import njit, types
 
+from limb_nodes.solve.pointer import call
+
 f8, i8 = types.float64, types.int64
 vector, integers, table = f8[::1], i8[::1], f8[:, ::1]
-RATES = types.FunctionType(types.void(f8, vector, vector, integers, table, vector, vector))
 
 DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2, 3
 # Joints within this distance (rad) of a limit are on it.
@@ -28,13 +29,13 @@ def step(rates, t, h, y, stages, p, k, u, c, stage_y, new_y):
     n = y.size
     for i in range(n):
         stage_y[i] = y[i] + h * 0.2 * stages[0, i]
-    rates(t + 0.2 * h, stage_y, p, k, u, c, stages[1])
+    call(rates, t + 0.2 * h, stage_y, p, k, u, c, stages[1])
     for i in range(n):
         stage_y[i] = y[i] + h * (3.0 / 40.0 * stages[0, i] + 9.0 / 40.0 * stages[1, i])
-    rates(t + 0.3 * h, stage_y, p, k, u, c, stages[2])
+    call(rates, t + 0.3 * h, stage_y, p, k, u, c, stages[2])
     for i in range(n):
         stage_y[i] = y[i] + h * (44.0 / 45.0 * stages[0, i] - 56.0 / 15.0 * stages[1, i] + 32.0 / 9.0 * stages[2, i])
-    rates(t + 0.8 * h, stage_y, p, k, u, c, stages[3])
+    call(rates, t + 0.8 * h, stage_y, p, k, u, c, stages[3])
     for i in range(n):
         stage_y[i] = y[i] + h * (
             19372.0 / 6561.0 * stages[0, i]
@@ -42,7 +43,7 @@ def step(rates, t, h, y, stages, p, k, u, c, stage_y, new_y):
             + 64448.0 / 6561.0 * stages[2, i]
             - 212.0 / 729.0 * stages[3, i]
         )
-    rates(t + 8.0 / 9.0 * h, stage_y, p, k, u, c, stages[4])
+    call(rates, t + 8.0 / 9.0 * h, stage_y, p, k, u, c, stages[4])
     for i in range(n):
         stage_y[i] = y[i] + h * (
             9017.0 / 3168.0 * stages[0, i]
@@ -51,7 +52,7 @@ def step(rates, t, h, y, stages, p, k, u, c, stage_y, new_y):
             + 49.0 / 176.0 * stages[3, i]
             - 5103.0 / 18656.0 * stages[4, i]
         )
-    rates(t + h, stage_y, p, k, u, c, stages[5])
+    call(rates, t + h, stage_y, p, k, u, c, stages[5])
     for i in range(n):
         new_y[i] = y[i] + h * (
             35.0 / 384.0 * stages[0, i]
@@ -60,7 +61,7 @@ def step(rates, t, h, y, stages, p, k, u, c, stage_y, new_y):
             - 2187.0 / 6784.0 * stages[4, i]
             + 11.0 / 84.0 * stages[5, i]
         )
-    rates(t + h, new_y, p, k, u, c, stages[6])
+    call(rates, t + h, new_y, p, k, u, c, stages[6])
 
 
 @njit(cache=True, error_model="numpy")
@@ -128,7 +129,7 @@ def pulled_back(reaction, joints, locked):
 def lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy):
     """Lock the joints that start on a limit and press against it."""
     for _ in range(joints):
-        rates(t, y, p, k, u, c, dy)
+        call(rates, t, y, p, k, u, c, dy)
         found = False
         for j in range(joints):
             if locked[j] != 0.0:
@@ -145,9 +146,9 @@ def lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy):
 
 
 SIGNATURE = types.int64(
-    RATES,
-    RATES,
-    RATES,
+    i8,
+    i8,
+    i8,
     f8,
     f8,
     vector,
@@ -215,9 +216,9 @@ def integrate(
         lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, stages[0])
         for j in range(joints):
             if locked[j] != 0.0 and y[joints + j] != 0.0:
-                strike(t, y, p, k, u, c, stages[1])
+                call(strike, t, y, p, k, u, c, stages[1])
                 break
-    rates(t, y, p, k, u, c, stages[0])
+    call(rates, t, y, p, k, u, c, stages[0])
     h = progress[3] if progress[3] > 0.0 else min(longest, span) * 0.01
     h = min(h, longest)
     last_error = 1e-4
@@ -254,7 +255,7 @@ def integrate(
             if joint >= 0:
                 event = 1
             elif t + h > quiet_until:
-                reactions(t + h, new_y, p, k, u, c, stage_y)
+                call(reactions, t + h, new_y, p, k, u, c, stage_y)
                 joint, _ = pulled_back(stage_y, joints, locked)
                 if joint >= 0:
                     event = 2
@@ -269,7 +270,7 @@ def integrate(
                 long_value = side * (new_y[joint] - limit)
             else:
                 long_value = locked[joint] * stage_y[joint]
-                reactions(t, y, p, k, u, c, stage_y)
+                call(reactions, t, y, p, k, u, c, stage_y)
                 short_value = min(-1e-300, locked[joint] * stage_y[joint])
             for _ in range(60):
                 part = short_value / (short_value - long_value)
@@ -278,7 +279,7 @@ def integrate(
                 if event == 1:
                     value = side * (new_y[joint] - limit)
                 else:
-                    reactions(t + h, new_y, p, k, u, c, stage_y)
+                    call(reactions, t + h, new_y, p, k, u, c, stage_y)
                     value = locked[joint] * stage_y[joint]
                 if value > 0.0:
                     if long_value > 0.0 and value > 0.5 * long_value:
@@ -301,12 +302,14 @@ def integrate(
         if event == 1:
             y[joint] = limit
             locked[joint] = side
-            strike(t, y, p, k, u, c, stage_y)
-            rates(t, y, p, k, u, c, stages[0])
+            call(strike, t, y, p, k, u, c, stage_y)
+            call(rates, t, y, p, k, u, c, stages[0])
+            h = max(h, 0.1 * wanted)
         elif event == 2:
             locked[joint] = 0.0
             quiet_until = t + LEAST_FLIGHT
-            rates(t, y, p, k, u, c, stages[0])
+            call(rates, t, y, p, k, u, c, stages[0])
+            h = max(h, 0.1 * wanted)
         else:
             for i in range(n):
                 stages[0, i] = stages[6, i]

@@ -514,6 +514,8 @@ def program(layout: Layout, entries: str) -> str:
         "S": layout.states,
         "D": layout.drives,
         "W": layout.work,
+        "P": layout.parameters.size,
+        "K": layout.index.size,
         "MUSCLE_RECORD": len(MUSCLE_INDEX),
         "GROUPS": groups,
         "GROUP_RECORD": len(GROUP_INDEX),
@@ -529,7 +531,7 @@ def program(layout: Layout, entries: str) -> str:
     }
     lines = [f"{name} = {value}" for name, value in constants.items()]
     lines += [f"{name} = {value!r}" for name, value in sorted(equations.constants.items())]
-    head = "import math\n\nimport numpy as np\nfrom numba import njit\n\n"
+    head = "import math\n\nimport numpy as np\nfrom numba import carray, cfunc, njit\n\n"
     return head + "\n".join(lines) + "\n\n\n" + "\n\n".join([*equations.texts, *texts, entries])
 
 

@@ -95,9 +95,9 @@ class MuscleStepper:
         self._progress[:3] = 0.0
         self._progress[3] = period
         status = explicit.integrate(
-            program.muscle_rates,
-            program.reactions,
-            program.strike,
+            program.muscle_rates_c.address,
+            0,
+            0,
             0.0,
             period,
             self.internal,
@@ -200,9 +200,9 @@ class LimbStepper:
         self._progress[:3] = 0.0
         self._progress[3] = period
         status = explicit.integrate(
-            program.limb_rates,
-            program.limb_reactions,
-            program.strike,
+            program.limb_rates_c.address,
+            program.limb_reactions_c.address,
+            program.strike_c.address,
             0.0,
             period,
             self._state,

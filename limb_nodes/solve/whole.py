@@ -121,9 +121,9 @@ class WholeModel:
         progress = np.zeros(4)
         layout, program = self.layout, self.program
         status = explicit.integrate(
-            program.rates,
-            program.reactions,
-            program.strike,
+            program.rates_c.address,
+            program.reactions_c.address,
+            program.strike_c.address,
             0.0,
             times[-1],
             y,

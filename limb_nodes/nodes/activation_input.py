@@ -1,0 +1,89 @@
+"""Node activation_input: sends the activation of every tick, from a source or from live EMG."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from limb_msgs.msg import MuscleActivation
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from limb_nodes.bags.activation import Activation, load_activation
+from limb_nodes.errors import UserError
+from limb_nodes.nodes.base import LimbNode, floats
+from limb_nodes.nodes.qos import LIVE, STREAM
+from limb_nodes.nodes.running import main_of
+
+
+class ActivationInput(LimbNode):
+    """On joint_states k sends activation k + 1, and activation 0 before it.
+
+    Subscribes `joint_states` and, without a source, `emg_envelope`; publishes `activation`.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("activation_input", **options)
+        source = self.text(
+            "source", "", "bag, CSV, waveform YAML or constants (flexor=0.9,...); empty: live from emg_envelope"
+        )
+        duration = self.number(
+            "duration", 0.0, "seconds of simulation time; 0: the whole recording, or without end when live", 0.0, 1e9
+        )
+        self.source: Activation | None = None
+        self.final: int | None = None
+        self.muscles = self.limb.muscle_names
+        if source:
+            self.source = load_activation(source, self.muscles, self.ticks.rate, duration or None)
+            self.final = len(self.source.values) - 1
+            for note in self.source.notes:
+                self.get_logger().info(note)
+        elif self.mode == "lockstep":
+            raise UserError(
+                "activation_input: the parameter source is empty; in mode lockstep a bag, CSV, waveform YAML or "
+                "constants are needed (live input needs mode realtime)"
+            )
+        else:
+            self.final = round(duration * self.ticks.rate) if duration else None
+            self.create_subscription(MuscleActivation, "emg_envelope", self.on_envelope, LIVE)
+        self.newest = np.zeros(len(self.muscles))
+        self.sent = -1
+        self.publisher = self.create_publisher(MuscleActivation, "activation", STREAM)
+        self.create_subscription(JointState, "joint_states", self.on_joint_states, STREAM)
+
+    def on_envelope(self, message: MuscleActivation) -> None:
+        """Take over a live envelope where every value is good."""
+        given = dict(zip(message.name, message.activation, strict=False))
+        values = np.array([given.get(name, np.nan) for name in self.muscles])
+        good = (values >= 0.0) & (values <= 1.0)
+        if good.all():
+            self.newest = values
+            return
+        name = self.muscles[int(np.flatnonzero(~good)[0])]
+        found = f"is {given[name]:g}" if name in given else "is missing"
+        self.complain(f"emg_envelope: {name} {found}, a number from 0 to 1 is needed")
+
+    def on_joint_states(self, message: JointState) -> None:
+        """Send what the tick of the message and the next one need."""
+        last = self.ticks.tick(message.header.stamp) + 1
+        if self.final is not None and last >= self.final:
+            last = self.final
+            self.finished = True
+        for tick in range(self.sent + 1, last + 1):
+            values = self.newest if self.source is None else self.source.values[tick]
+            self.publisher.publish(
+                MuscleActivation(
+                    header=Header(stamp=self.ticks.stamp(tick)),
+                    tick=tick,
+                    name=self.muscles,
+                    activation=floats(values),
+                    last=tick == self.final,
+                )
+            )
+        self.sent = max(self.sent, last)
+
+
+main = main_of(ActivationInput)
+
+if __name__ == "__main__":
+    main()

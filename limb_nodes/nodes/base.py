@@ -1,0 +1,96 @@
+"""What every node of the limb has: parameters with ranges, its limb, and a count of bad input."""
+
+from __future__ import annotations
+
+import array
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+
+from limb_nodes.errors import UserError
+from limb_nodes.model import Limb, load_limb
+from limb_nodes.nodes.ticks import Ticks
+
+MODES = ("lockstep", "realtime")
+NODES = ("activation_input", "muscle_stack", "limb_dynamics", "recorder")
+FAREWELL = "at the end of the run"
+
+
+class LimbNode(Node):
+    """A node of one limb at one rate.
+
+    finished: whether the node has done its part of the run.
+    """
+
+    def __init__(self, name: str, **options: Any) -> None:
+        super().__init__(name, **options)
+        self.finished = False
+        self.bad_input = 0
+        self._last_complaint = -math.inf
+        path = self.text("limb", "", "the limb's YAML file")
+        if not path:
+            raise UserError(f"{name}: the parameter limb is empty; the path of a limb's YAML file is needed")
+        self.limb: Limb = load_limb(path)
+        self.mode = self.choice("mode", MODES, "lockstep: tick after tick as fast as possible; realtime: by the clock")
+        self.ticks = Ticks(self.number("rate", 1000.0, "ticks per second of simulation time", 0.0, 100_000.0))
+
+    def text(self, name: str, default: str, meaning: str) -> str:
+        """A parameter that holds a text, fixed at the start."""
+        descriptor = ParameterDescriptor(description=meaning, read_only=True)
+        return str(self._declare(name, default, descriptor, "a text"))
+
+    def choice(self, name: str, allowed: Sequence[str], meaning: str) -> str:
+        """A parameter that holds one of some texts, the first by default."""
+        value = self.text(name, allowed[0], f"{meaning} (one of {', '.join(allowed)})")
+        if value not in allowed:
+            raise UserError(f"{self.get_name()}: the parameter {name} is {value!r}; allowed: {', '.join(allowed)}")
+        return value
+
+    def number(self, name: str, default: float, meaning: str, lowest: float, highest: float) -> float:
+        """A parameter that holds a number within a range."""
+        span = FloatingPointRange(from_value=lowest, to_value=highest)
+        descriptor = ParameterDescriptor(description=meaning, read_only=True, floating_point_range=[span])
+        return float(self._declare(name, default, descriptor, f"a number from {lowest:g} to {highest:g}"))
+
+    def whole(self, name: str, default: int, meaning: str, lowest: int, highest: int) -> int:
+        """A parameter that holds a whole number within a range."""
+        span = IntegerRange(from_value=lowest, to_value=highest, step=1)
+        descriptor = ParameterDescriptor(description=meaning, read_only=True, integer_range=[span])
+        return int(self._declare(name, default, descriptor, f"a whole number from {lowest} to {highest}"))
+
+    def switch(self, name: str, default: bool, meaning: str) -> bool:
+        """A parameter that is true or false."""
+        descriptor = ParameterDescriptor(description=meaning, read_only=True)
+        return bool(self._declare(name, default, descriptor, "true or false"))
+
+    def _declare(self, name: str, default: Any, descriptor: ParameterDescriptor, needed: str) -> Any:
+        try:
+            return self.declare_parameter(name, default, descriptor).value
+        except Exception as problem:
+            given = [p.value for p in self._parameter_overrides.values() if p.name == name]
+            found = f"is {given[0]!r}" if given else f"cannot be read ({problem})"
+            raise UserError(f"{self.get_name()}: the parameter {name} {found}; {needed} is needed") from None
+
+    def complain(self, what: str) -> None:
+        """Count a message that cannot be used, and say so once per second at most."""
+        self.bad_input += 1
+        now = self.get_clock().now().nanoseconds * 1e-9
+        if now - self._last_complaint >= 1.0:
+            self._last_complaint = now
+            self.get_logger().warning(f"{what}; kept the last good value ({self.bad_input} so far)")
+
+
+def floats(values: np.ndarray) -> array.array[float]:
+    """Numbers for a float64[] field, without a check per number."""
+    result = array.array("d")
+    result.frombytes(np.ascontiguousarray(values, dtype=np.float64).tobytes())
+    return result
+
+
+def finite(*fields: Sequence[float]) -> bool:
+    """Whether all numbers of some fields are finite."""
+    return all(math.isfinite(value) for field in fields for value in field)

@@ -1,0 +1,209 @@
+"""Node limb_dynamics: from joint torques to joint states and the movement pattern."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point, WrenchStamped
+from limb_msgs.msg import JointTorque, MovementPattern
+from rclpy.clock import Clock, ClockType
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header, Int64, String
+
+from limb_nodes.model.points import point_names, points
+from limb_nodes.nodes.base import LimbNode, finite, floats
+from limb_nodes.nodes.qos import LATCHED, LIVE, RECORDER_LAG, STREAM
+from limb_nodes.nodes.running import main_of
+from limb_nodes.nodes.urdf import urdf
+from limb_nodes.solve.stepping import LimbStepper
+
+REMEMBERED = 1000
+REPORT_PERIOD = 1.0
+
+
+class LimbDynamics(LimbNode):
+    """Offers joint_states 0, then steps from tick to tick.
+
+    In lockstep joint_torque k leads to joint_states k + 1. In real time a wall timer at the fixed
+    rate does, with the newest torque; ticks whose torque is not there in time are counted.
+    Subscribes `joint_torque` and `external_load`; publishes `joint_states`, `movement_pattern`,
+    `robot_description` and `/diagnostics`.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("limb_dynamics", **options)
+        self.awaits_recorder = self.switch(
+            "await_recorder", False, "start with the recorder and never run farther ahead than it can take"
+        )
+        self.stepper = LimbStepper(self.limb)
+        self.stepper.acceleration(np.zeros((4, self.stepper.joints)))
+        self.joints = self.limb.joint_names
+        self.points = point_names(self.limb)
+        self.tick = 0
+        self.missed = 0
+        self.recorded = -1
+        self.pending: JointTorque | None = None
+        self.newest: tuple[int, np.ndarray] | None = None
+        self.history: OrderedDict[int, tuple[np.ndarray, np.ndarray]] = OrderedDict()
+        self.started_at: float | None = None
+        self.last_report = 0.0
+        self.last_tick: int | None = None
+        self.state_publisher = self.create_publisher(JointState, "joint_states", STREAM)
+        self.pattern_publisher = self.create_publisher(MovementPattern, "movement_pattern", STREAM)
+        self.diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", LIVE)
+        self.description = self.create_publisher(String, "robot_description", LATCHED)
+        self.description.publish(String(data=urdf(self.limb)))
+        self.create_subscription(JointTorque, "joint_torque", self.on_torque, STREAM)
+        self.create_subscription(WrenchStamped, "external_load", self.on_load, LIVE)
+        if self.awaits_recorder:
+            self.create_subscription(Int64, "recorder_progress", self.on_recorded, LATCHED)
+        else:
+            self.offer()
+        if self.mode == "realtime":
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self.create_timer(self.ticks.period, self.on_timer, clock=steady)
+
+    def offer(self) -> None:
+        """Publish the joint states of the current tick."""
+        self.state_publisher.publish(
+            JointState(
+                header=Header(stamp=self.ticks.stamp(self.tick)),
+                name=self.joints,
+                position=floats(self.stepper.angle),
+                velocity=floats(self.stepper.velocity),
+            )
+        )
+
+    def on_recorded(self, message: Int64) -> None:
+        """The recorder has every tick up to this one; -1 when it is ready."""
+        first = self.recorded < 0 and self.tick == 0 and not self.history
+        self.recorded = message.data
+        if first and message.data < 0:
+            self.history[-1] = self.stepper.angle.copy(), self.stepper.velocity.copy()
+            self.offer()
+        elif self.pending is not None and self.tick - self.recorded <= RECORDER_LAG:
+            held, self.pending = self.pending, None
+            self.on_torque(held)
+
+    def on_load(self, message: WrenchStamped) -> None:
+        """Take over force and torque on the tip."""
+        force, torque = message.wrench.force, message.wrench.torque
+        values = force.x, force.y, torque.z
+        if finite(values):
+            self.stepper.load[:] = values
+        else:
+            self.complain("external_load: a force or torque is not finite")
+
+    def on_torque(self, message: JointTorque) -> None:
+        """Take over a torque; in lockstep also step."""
+        if message.joint == self.joints:
+            rows = np.array([message.torque, message.slope_angle, message.slope_velocity, message.slope_time])
+        else:
+            rows = np.array([])
+        if rows.shape != (4, len(self.joints)) or not np.isfinite(rows).all():
+            self.complain(f"joint_torque of tick {message.tick}: finite numbers for {', '.join(self.joints)} needed")
+            return
+        if message.last:
+            self.last_tick = message.tick
+        if self.mode == "realtime":
+            if self.newest is None or message.tick > self.newest[0]:
+                self.newest = message.tick, rows
+            return
+        if message.tick != self.tick or self.finished:
+            return
+        if self.awaits_recorder and self.tick - self.recorded > RECORDER_LAG:
+            self.pending = message
+            return
+        self.step(rows)
+
+    def on_timer(self) -> None:
+        """Step as far as the wall clock has gone, with the newest torque."""
+        now = time.monotonic()
+        if self.newest is None or self.finished:
+            return
+        if self.started_at is None:
+            self.started_at = now - self.ticks.period
+        due = int((now - self.started_at) / self.ticks.period + 0.1)
+        if due > self.tick + 1:
+            self.missed += due - self.tick - 1
+        while self.tick < due and not self.finished:
+            tick, rows = self.newest
+            if tick != self.tick:
+                self.missed += 1
+                rows = self.carried(tick, rows)
+            self.step(rows)
+        if now - self.last_report >= REPORT_PERIOD:
+            self.last_report = now
+            self.report()
+
+    def carried(self, tick: int, rows: np.ndarray) -> np.ndarray:
+        """The torque of an older tick, carried to the current state along its slopes."""
+        if tick not in self.history:
+            return rows
+        angle, velocity = self.history[tick]
+        carried = rows.copy()
+        carried[0] += (
+            rows[1] * (self.stepper.angle - angle)
+            + rows[2] * (self.stepper.velocity - velocity)
+            + rows[3] * (self.tick - tick) * self.ticks.period
+        )
+        return carried
+
+    def step(self, rows: np.ndarray) -> None:
+        """Publish the movement pattern of this tick and go on to the next."""
+        self.publish_pattern(self.stepper.acceleration(rows))
+        if self.tick == self.last_tick:
+            self.finished = True
+            if self.mode == "realtime":
+                self.report()
+            return
+        if self.mode == "realtime":
+            self.history[self.tick] = self.stepper.angle.copy(), self.stepper.velocity.copy()
+            if len(self.history) > REMEMBERED:
+                self.history.popitem(last=False)
+        self.stepper.step(rows, self.ticks.period)
+        self.tick += 1
+        self.offer()
+
+    def publish_pattern(self, acceleration: np.ndarray) -> None:
+        """Publish angles, velocities, accelerations and points of this tick."""
+        self.pattern_publisher.publish(
+            MovementPattern(
+                header=Header(stamp=self.ticks.stamp(self.tick)),
+                tick=self.tick,
+                joint=self.joints,
+                angle=floats(self.stepper.angle),
+                velocity=floats(self.stepper.velocity),
+                acceleration=floats(acceleration),
+                point=self.points,
+                position=[Point(x=x, y=y) for x, y in points(self.limb, self.stepper.angle)],
+            )
+        )
+
+    def report(self) -> None:
+        """Publish how real time is kept."""
+        level = DiagnosticStatus.WARN if self.missed else DiagnosticStatus.OK
+        status = DiagnosticStatus(
+            level=level,
+            name=self.get_fully_qualified_name(),
+            message=f"{self.missed} missed deadlines in {self.tick} ticks",
+            values=[
+                KeyValue(key="ticks", value=str(self.tick)),
+                KeyValue(key="missed_deadlines", value=str(self.missed)),
+                KeyValue(key="bad_input", value=str(self.bad_input)),
+            ],
+        )
+        stamp = self.get_clock().now().to_msg()
+        self.diagnostics.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
+        if self.missed:
+            self.get_logger().warning(status.message, throttle_duration_sec=1.0)
+
+
+main = main_of(LimbDynamics)
+
+if __name__ == "__main__":
+    main()

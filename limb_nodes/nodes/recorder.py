@@ -1,0 +1,234 @@
+"""Node recorder: writes every topic of a run to a bag that suffices to run it again."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+import struct
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from limb_msgs.msg import (
+    JointTorque,
+    MotorUnitState,
+    MovementPattern,
+    MuscleActivation,
+    MuscleState,
+    SarcomereState,
+)
+from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Int64, String
+
+from limb_nodes import __version__
+from limb_nodes.bags.types import TOPIC_TYPES
+from limb_nodes.bags.write import BagWriter, refuse_existing
+from limb_nodes.errors import UserError
+from limb_nodes.nodes.base import NODES, LimbNode
+from limb_nodes.nodes.qos import LATCHED, LIVE, STREAM
+from limb_nodes.nodes.running import main_of
+from limb_nodes.nodes.ticks import SECOND
+
+TICKED = {
+    "activation": MuscleActivation,
+    "joint_states": JointState,
+    "joint_torque": JointTorque,
+    "movement_pattern": MovementPattern,
+    "muscle_state": MuscleState,
+    "motor_unit_state": MotorUnitState,
+    "sarcomere_state": SarcomereState,
+}
+STATES = ("muscle_state", "motor_unit_state", "sarcomere_state")
+OTHERS = {"emg_envelope": MuscleActivation, "external_load": WrenchStamped, "/diagnostics": DiagnosticArray}
+PROGRESS_EVERY = 32
+# How long to wait for the other nodes to tell their parameters once messages flow (s).
+PATIENCE = 5.0
+PACKAGES = ("numpy", "numba", "rosbags", "ros-rclpy", "scipy")
+
+
+class Recorder(LimbNode):
+    """Subscribes every topic and writes each tick once.
+
+    Publishes `recorder_progress`: -1 when it is ready, then the newest tick that it has on every
+    topic. Finished when the last tick of the run is in the bag on every topic.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("recorder", **options)
+        out = self.text("out", "", "folder of the bag, which must not exist")
+        self.command = self.text("command", "", "the command that started the run, for the record")
+        if not out:
+            raise UserError("recorder: the parameter out is empty; the folder of a new bag is needed")
+        self.path = out
+        from pathlib import Path
+
+        refuse_existing(Path(out))
+        self.writer: BagWriter | None = None
+        self.buffer: list[tuple[str, int, bytes]] = []
+        self.newest = dict.fromkeys(TICKED, -1)
+        self.counts = dict.fromkeys(TICKED, 0)
+        self.expected = {topic: 1 for topic in TICKED if topic not in STATES}
+        self.last_tick: int | None = None
+        self.announced = -2
+        self.parameters: dict[str, dict[str, Any]] = {"recorder": own_parameters(self)}
+        self.asked: dict[str, AsyncParameterClient] = {}
+        self.first_message: float | None = None
+        self.progress = self.create_publisher(Int64, "recorder_progress", LATCHED)
+        for topic, kind in TICKED.items():
+            self.create_subscription(kind, topic, partial(self.on_tick, topic), STREAM, raw=True)
+        for topic, kind in OTHERS.items():
+            self.create_subscription(kind, topic, partial(self.on_other, topic), LIVE, raw=True)
+        self.description: str | None = None
+        self.create_subscription(String, "robot_description", self.on_description, LATCHED)
+        self.asking = self.create_timer(0.05, self.ask)
+
+    def on_description(self, message: String) -> None:
+        """Keep the robot description for the bag."""
+        if self.description is None:
+            self.description = message.data
+
+    def ask(self) -> None:
+        """Ask the other nodes for their parameters until all have told them; then open the bag."""
+        present = set(self.get_node_names_and_namespaces())
+        for name in NODES:
+            known = name in self.asked or name in self.parameters
+            if not known and (name, self.get_namespace()) in present:
+                client = AsyncParameterClient(self, name)
+                if client.services_are_ready():
+                    self.asked[name] = client
+                    client.list_parameters(callback=partial(self.on_names, name, client))
+        waited = self.first_message is not None and time.monotonic() - self.first_message > PATIENCE
+        if set(self.parameters) >= set(NODES) or waited:
+            self.asking.cancel()
+            self.open()
+
+    def on_names(self, node: str, client: AsyncParameterClient, future: Any) -> None:
+        """Ask for the values of a node's parameters."""
+        names = list(future.result().result.names)
+        client.get_parameters(names, callback=partial(self.on_values, node, names))
+
+    def on_values(self, node: str, names: list[str], future: Any) -> None:
+        """Keep the values of a node's parameters."""
+        values = [parameter_value_to_python(value) for value in future.result().values]
+        self.parameters[node] = dict(zip(names, values, strict=True))
+
+    def open(self) -> None:
+        """Make the bag, write what has come so far, and say that the run may start."""
+        muscle_stack = self.parameters.get("muscle_stack", {})
+        for topic in STATES:
+            if muscle_stack.get(f"publish_{topic}", True):
+                self.expected[topic] = int(muscle_stack.get("state_every", 1))
+        self.writer = BagWriter(self.path, self.run_info(), namespace=self.get_namespace())
+        for topic, stamp, data in self.buffer:
+            self.writer.write_raw(topic, stamp, data, TOPIC_TYPES[topic])
+        self.buffer.clear()
+        if self.description is not None:
+            self.write("robot_description", 0, String(data=self.description))
+        self.announce()
+
+    def write(self, topic: str, stamp: int, message: Any) -> None:
+        """Write a message of rclpy."""
+        from rclpy.serialization import serialize_message
+
+        assert self.writer is not None
+        self.writer.write_raw(topic, stamp, serialize_message(message), TOPIC_TYPES[topic])
+
+    def run_info(self) -> dict[str, Any]:
+        """What is needed to run again what the bag holds."""
+        return {
+            "limb": self.limb.text,
+            "limb_file": self.limb.file,
+            "command": self.command,
+            "rate": self.ticks.rate,
+            "period_ns": self.ticks.nanoseconds,
+            "parameters": self.parameters,
+            "versions": versions(),
+            # Nothing in a run is random; recordings made with noise would name theirs here.
+            "seed": None,
+        }
+
+    def on_tick(self, topic: str, data: bytes) -> None:
+        """Write a serialised message of a tick, unless that tick is there already."""
+        sec, nanosec = struct.unpack_from("<iI", data, 4)
+        stamp = sec * SECOND + nanosec
+        tick = round(stamp / self.ticks.nanoseconds)
+        if tick <= self.newest[topic]:
+            return
+        if self.first_message is None:
+            self.first_message = time.monotonic()
+        self.newest[topic] = tick
+        self.counts[topic] += 1
+        self.put(topic, stamp, data)
+        if topic == "joint_torque" and is_last(data):
+            self.last_tick = tick
+        if tick % PROGRESS_EVERY == 0 or self.last_tick is not None:
+            self.announce()
+
+    def on_other(self, topic: str, data: bytes) -> None:
+        """Write a message that belongs to no tick at the time of the newest tick."""
+        self.put(topic, max(0, self.newest["joint_states"]) * self.ticks.nanoseconds, data)
+
+    def put(self, topic: str, stamp: int, data: bytes) -> None:
+        """Hand a message to the bag, or keep it until the bag is open."""
+        if self.writer is None:
+            self.buffer.append((topic, stamp, bytes(data)))
+        else:
+            self.writer.write_raw(topic, stamp, data, TOPIC_TYPES[topic])
+
+    def announce(self) -> None:
+        """Publish the newest tick that is there on every topic."""
+        if self.writer is None:
+            return
+        complete = min(self.newest[topic] + every - 1 for topic, every in self.expected.items())
+        if self.last_tick is not None and complete >= self.last_tick:
+            self.finished = True
+        if complete > self.announced:
+            self.announced = complete
+            self.progress.publish(Int64(data=complete if complete >= 0 and self.counts["joint_states"] else -1))
+
+    def missing(self) -> int:
+        """Ticks that are not in the bag on a topic that should have them."""
+        ticks = self.newest["joint_states"] + 1
+        return sum(max(0, -(-ticks // every) - self.counts[topic]) for topic, every in self.expected.items() if ticks)
+
+    def destroy_node(self) -> None:
+        """Close the bag, so that it is readable however the run ended."""
+        if self.writer is None and self.buffer:
+            self.open()
+        if self.writer is not None:
+            self.writer.close()
+        super().destroy_node()
+
+
+def is_last(data: bytes) -> bool:
+    """The flag `last` of a serialised JointTorque: behind the header and the tick."""
+    (length,) = struct.unpack_from("<I", data, 12)
+    tick = -(-(12 + length) // 8) * 8
+    return data[4 + tick + 8] == 1
+
+
+def own_parameters(node: LimbNode) -> dict[str, Any]:
+    """The parameters of this node."""
+    return {name: parameter.value for name, parameter in node._parameters.items()}
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a run's numbers depend on."""
+    found = {"limb_nodes": __version__, "python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+main: Callable[..., None] = main_of(Recorder)
+
+if __name__ == "__main__":
+    main()

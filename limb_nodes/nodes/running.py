@@ -1,0 +1,106 @@
+"""Running nodes: start, spin until they have finished or are interrupted, end cleanly."""
+
+from __future__ import annotations
+
+import gc
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from limb_nodes.errors import UserError
+
+# The executor is asked for one event at a time with a time-out: without one it hangs when idle.
+SPIN_TIMEOUT = 0.05
+
+
+def make_executor(context: Context) -> Executor:
+    """The events executor, or the single-threaded one where rclpy has no other."""
+    try:
+        from rclpy.experimental import EventsExecutor
+    except ImportError:
+        return SingleThreadedExecutor(context=context)
+    return EventsExecutor(context=context)
+
+
+def spin(executor: Executor, done: Callable[[], bool]) -> None:
+    """Handle events until `done`."""
+    with suppress(ExternalShutdownException):
+        while not done():
+            executor.spin_once(timeout_sec=SPIN_TIMEOUT)
+
+
+class Interrupt:
+    """Turns SIGINT and SIGTERM into a wish to stop, so that no callback is cut in two."""
+
+    def __init__(self) -> None:
+        self.wanted = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._want)
+
+    def _want(self, *_: Any) -> None:
+        self.wanted = True
+
+
+def main_of(node_class: Callable[..., Node]) -> Callable[[Sequence[str] | None], None]:
+    """The `main` of a node's module."""
+
+    def main(args: Sequence[str] | None = None) -> None:
+        sys.exit(run_node(node_class, args))
+
+    return main
+
+
+def run_node(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
+    """Run one node until it has finished or is interrupted; its exit status."""
+    interrupt = Interrupt()
+    context = Context()
+    node = None
+    try:
+        rclpy.init(args=args, context=context, signal_handler_options=SignalHandlerOptions.NO)
+        node = node_class(context=context)
+        executor = make_executor(context)
+        executor.add_node(node)
+        # What exists now stays: collecting it again and again would cost ticks.
+        gc.collect()
+        gc.freeze()
+        spin(executor, lambda: interrupt.wanted or node.finished)
+        if not interrupt.wanted:
+            linger(executor, node, interrupt)
+        return 0
+    except UserError as error:
+        print(f"limb: error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        if node is not None:
+            node.destroy_node()
+        with suppress(Exception):
+            rclpy.shutdown(context=context)
+
+
+def linger(executor: Executor, node: Any, interrupt: Interrupt) -> None:
+    """Stay until everybody who listens has taken the last messages, 5 s at most."""
+    clock = node.get_clock()
+    end = clock.now().nanoseconds + 5_000_000_000
+    publishers = [p for p in node.publishers if p.get_subscription_count() > 0]
+    for publisher in publishers:
+        while not interrupt.wanted and clock.now().nanoseconds < end:
+            if acknowledged(publisher):
+                break
+            executor.spin_once(timeout_sec=SPIN_TIMEOUT)
+
+
+def acknowledged(publisher: Any) -> bool:
+    """Whether all messages of a publisher have arrived."""
+    from rclpy.duration import Duration
+
+    return bool(publisher.wait_for_all_acked(Duration(seconds=0.05)))

@@ -1,0 +1,255 @@
+"""A whole run: the four nodes in one process, or each in its own."""
+
+from __future__ import annotations
+
+import gc
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Int64
+
+from limb_nodes.errors import UserError
+from limb_nodes.nodes.activation_input import ActivationInput
+from limb_nodes.nodes.base import NODES
+from limb_nodes.nodes.limb_dynamics import LimbDynamics
+from limb_nodes.nodes.muscle_stack import MuscleStack
+from limb_nodes.nodes.qos import LATCHED
+from limb_nodes.nodes.recorder import Recorder
+from limb_nodes.nodes.running import Interrupt, make_executor
+
+CLASSES = {
+    "activation_input": ActivationInput,
+    "muscle_stack": MuscleStack,
+    "limb_dynamics": LimbDynamics,
+    "recorder": Recorder,
+}
+STARTING = 60.0
+ENDING = 10.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """What to run. limb: YAML file. source: of activations, empty for live input. rate: Hz.
+
+    duration: s, 0 for the whole source. namespace: of all nodes. states: topics of states to
+    record, every `state_every` ticks.
+    """
+
+    limb: str
+    source: str
+    rate: float
+    duration: float
+    out: str
+    mode: str = "lockstep"
+    namespace: str = ""
+    states: tuple[str, ...] = ("muscle_state", "motor_unit_state", "sarcomere_state")
+    state_every: int = 1
+    command: str = ""
+
+    def parameters(self, node: str) -> dict[str, Any]:
+        """The ROS parameters of a node."""
+        common = {"limb": self.limb, "mode": self.mode, "rate": self.rate}
+        own: dict[str, dict[str, Any]] = {
+            "activation_input": {"source": self.source, "duration": self.duration},
+            "muscle_stack": {
+                "state_every": self.state_every,
+                **{
+                    f"publish_{topic}": topic in self.states
+                    for topic in ("muscle_state", "motor_unit_state", "sarcomere_state")
+                },
+            },
+            "limb_dynamics": {"await_recorder": True},
+            "recorder": {"out": self.out, "command": self.command},
+        }
+        return {**common, **own[node]}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run went. ticks: on the topic joint_states; missing: ticks not in the bag, over all topics;
+    missed: deadlines in real time; bad_input: messages that could not be used; seconds: wall time.
+    """
+
+    ticks: int
+    missing: int
+    missed: int
+    bad_input: int
+    seconds: float
+    interrupted: bool
+
+
+Progress = Callable[[int], None]
+
+
+def run_in_one_process(run: Run, progress: Progress) -> Outcome:
+    """Run the nodes in this process. `progress` is called with the newest recorded tick."""
+    interrupt = Interrupt()
+    context = Context()
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    nodes: dict[str, Any] = {}
+    try:
+        executor = make_executor(context)
+        for name in NODES:
+            overrides = [Parameter(key, value=value) for key, value in run.parameters(name).items()]
+            nodes[name] = CLASSES[name](context=context, parameter_overrides=overrides, namespace=run.namespace or None)
+            executor.add_node(nodes[name])
+        gc.collect()
+        gc.freeze()
+        recorder, dynamics = nodes["recorder"], nodes["limb_dynamics"]
+        started = None
+        while not (recorder.finished or interrupt.wanted):
+            executor.spin_once(timeout_sec=0.05)
+            if started is None and dynamics.tick > 0:
+                started = time.monotonic()
+            progress(recorder.announced)
+        ended = time.monotonic()
+        return Outcome(
+            ticks=recorder.counts["joint_states"],
+            missing=recorder.missing(),
+            missed=dynamics.missed,
+            bad_input=sum(node.bad_input for node in nodes.values()),
+            seconds=ended - (started or ended),
+            interrupted=interrupt.wanted,
+        )
+    finally:
+        for node in nodes.values():
+            node.destroy_node()
+        with suppress(Exception):
+            rclpy.shutdown(context=context)
+
+
+def run_in_processes(run: Run, progress: Progress) -> Outcome:
+    """Run each node in a process of its own."""
+    interrupt = Interrupt()
+    context = Context()
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    observer = rclpy.create_node("limb_run", context=context, namespace=run.namespace or None)
+    recorded = {"tick": -2}
+    observer.create_subscription(
+        Int64, "recorder_progress", lambda message: recorded.update(tick=message.data), LATCHED
+    )
+    children: dict[str, subprocess.Popen[str]] = {}
+    try:
+        executor = make_executor(context)
+        executor.add_node(observer)
+        for name in NODES:
+            children[name] = start(run, name)
+        begun = time.monotonic()
+        started = None
+        while children["recorder"].poll() is None and not interrupt.wanted:
+            executor.spin_once(timeout_sec=0.05)
+            progress(recorded["tick"])
+            if started is None and recorded["tick"] > 0:
+                started = time.monotonic()
+            for name, child in children.items():
+                if child.poll() not in (None, 0):
+                    stop(children)
+                    raise UserError(complaint(name, child))
+            if started is None and time.monotonic() - begun > STARTING:
+                raise UserError(f"the nodes did not start within {STARTING:g} s; is another run using the same topics?")
+        ended = time.monotonic()
+        stop(children)
+        status = children["recorder"].returncode
+        if status != 0:
+            raise UserError(complaint("recorder", children["recorder"]))
+        return recorded_outcome(run, ended - (started or ended), interrupt.wanted)
+    finally:
+        stop(children)
+        observer.destroy_node()
+        with suppress(Exception):
+            rclpy.shutdown(context=context)
+
+
+def start(run: Run, name: str) -> subprocess.Popen[str]:
+    """Start one node."""
+    arguments = ["--ros-args"]
+    if run.namespace:
+        arguments += ["-r", f"__ns:={run.namespace}"]
+    for key, value in run.parameters(name).items():
+        text = str(value).lower() if isinstance(value, bool) else value
+        # Quoted, so that a text such as 'yes' or '1' stays a text.
+        given = "'" + str(value).replace("'", "''") + "'" if isinstance(value, str) else text
+        arguments += ["-p", f"{key}:={given}"]
+    return subprocess.Popen(
+        [sys.executable, "-m", f"limb_nodes.nodes.{name}", *arguments],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stdin=subprocess.DEVNULL,
+        text=True,
+        # Ctrl-C goes to this process alone, which then ends the others in order.
+        start_new_session=True,
+        env=os.environ.copy(),
+    )
+
+
+def stop(children: dict[str, subprocess.Popen[str]]) -> None:
+    """End all nodes, the recorder last, each by its own handle."""
+    for name in ("activation_input", "limb_dynamics", "muscle_stack", "recorder"):
+        child = children.get(name)
+        if child is None or child.poll() is not None:
+            continue
+        child.terminate()
+        try:
+            child.wait(ENDING)
+        except subprocess.TimeoutExpired:
+            child.kill()
+            child.wait()
+
+
+def complaint(name: str, child: subprocess.Popen[str]) -> str:
+    """What a node that failed has said."""
+    said = child.stderr.read().strip().splitlines() if child.stderr else []
+    lines = [line.removeprefix("limb: error: ") for line in said if line.startswith("limb: error: ")]
+    return lines[-1] if lines else f"{name} ended with status {child.returncode}: {said[-1] if said else 'no message'}"
+
+
+def recorded_outcome(run: Run, seconds: float, interrupted: bool) -> Outcome:
+    """Count what the bag of a run holds."""
+    from limb_nodes.bags.read import BagReader
+
+    with BagReader(run.out) as bag:
+        ticks = bag.count("joint_states")
+        expected = ["activation", "joint_torque", "movement_pattern", *run.states]
+        missing = 0
+        for topic in expected:
+            every = run.state_every if topic in run.states else 1
+            missing += max(0, -(-ticks // every) - bag.count(topic))
+        missed, bad_input = 0, 0
+        if bag.has("/diagnostics"):
+            for _, message in bag.read_topic("/diagnostics"):
+                for status in message.status:
+                    values = {pair.key: pair.value for pair in status.values}
+                    missed = int(values.get("missed_deadlines", missed))
+                    bad_input = int(values.get("bad_input", bad_input))
+    return Outcome(ticks, missing, missed, bad_input, seconds, interrupted)
+
+
+def checked(run: Run) -> tuple[Run, int | None]:
+    """Check a run before anything is written; the run with absolute paths and its last tick."""
+    from limb_nodes.bags.activation import load_activation
+    from limb_nodes.bags.write import refuse_existing
+    from limb_nodes.model import load_limb
+    from limb_nodes.nodes.ticks import Ticks
+
+    limb = load_limb(run.limb)
+    Ticks(run.rate)
+    refuse_existing(Path(run.out))
+    final = round(run.duration * run.rate) if run.duration else None
+    if run.source:
+        activation = load_activation(run.source, limb.muscle_names, run.rate, run.duration or None)
+        final = len(activation.values) - 1
+    elif run.mode == "lockstep":
+        raise UserError("--activation is missing; in lockstep a bag, CSV, waveform YAML or constants are needed")
+    source = str(Path(run.source).resolve()) if run.source and Path(run.source).exists() else run.source
+    return replace(run, limb=str(Path(run.limb).resolve()), out=str(Path(run.out).resolve()), source=source), final

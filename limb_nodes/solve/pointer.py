@@ -1,0 +1,39 @@
+"""Calling compiled right-hand sides by address.
+
+The integrators take a limb's program as numbers. Numba would take functions too, but looks up
+their types anew at every call, which costs more than a whole tick.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+f8, i8 = types.float64, types.int64
+numbers, whole_numbers = types.CPointer(f8), types.CPointer(i8)
+# t, y, parameters, index, input, rows of input, context, result
+SIGNATURE = types.void(f8, numbers, numbers, whole_numbers, numbers, i8, numbers, numbers)
+
+
+@intrinsic
+def call(typingctx, address, t, y, p, k, u, c, out):  # type: ignore[no-untyped-def]
+    """Call the right-hand side at `address`: rates `out` at time t and state y."""
+    signature = types.void(address, t, y, p, k, u, c, out)
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        double, integer = ir.DoubleType(), ir.IntType(64)
+        pointer, integers = double.as_pointer(), integer.as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [double, pointer, pointer, integers, pointer, integer, pointer, pointer])
+        arrays = [
+            context.make_array(array_type)(context, builder, value)
+            for array_type, value in zip(signature.args[2:], arguments[2:], strict=True)
+        ]
+        y_, p_, k_, u_, c_, out_ = arrays
+        rows = cgutils.unpack_tuple(builder, u_.shape)[0]
+        function = builder.inttoptr(arguments[0], kind.as_pointer())
+        builder.call(function, [arguments[1], y_.data, p_.data, k_.data, u_.data, rows, c_.data, out_.data])
+        return context.get_dummy_value()
+
+    return signature, generate
