@@ -1,0 +1,1 @@
+"""What is examined, fitted and drawn: no ROS, on top of the whole-model solve."""

@@ -1,0 +1,132 @@
+"""The levels of a limb, each as a set of equations with its unknowns and inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from limb_nodes.analysis.structure import chain, muscles
+from limb_nodes.analysis.structure.muscles import APONEUROSIS, MUSCLE, SARCOMERE, TENDON, UNIT, unit_owner
+from limb_nodes.analysis.structure.relations import Assembly, EquationSet
+from limb_nodes.levels import Law
+from limb_nodes.model import Limb, Muscle
+
+ASSEMBLED, MODEL = "muscle_assembled", "model"
+TITLES = {
+    SARCOMERE: "level of sarcomere",
+    UNIT: "level of motor unit",
+    MUSCLE: "level of muscle, sub-level of muscle",
+    TENDON: "level of muscle, sub-level of tendon",
+    APONEUROSIS: "level of muscle, sub-level of aponeurosis",
+    ASSEMBLED: "muscle with tendon, aponeurosis, motor units and sarcomeres",
+    chain.ORIGINAL: "level of limb, original form",
+    chain.TRANSFORMED: "level of limb, transformed form",
+    MODEL: "whole model",
+}
+MUSCLE_LEVELS = (SARCOMERE, UNIT, MUSCLE, TENDON, APONEUROSIS)
+UNIT_LAWS = ("force_length", "force_frequency", "passive_force")
+MUSCLE_LAWS = ("path", "aponeurosis", "activation_dynamics")
+
+
+def equation_sets(limb: Limb, level: str | None = None) -> list[EquationSet]:
+    """The equations of every level of a limb, or of the level that is named.
+
+    Muscles and motor units with the same laws appear once, with all of them as members.
+    """
+    assembly = muscles.muscle_assembly(limb)
+    found: list[EquationSet] = []
+    found += sets_of_units(limb, assembly)
+    found += sets_of_muscles(limb, assembly)
+    joints = limb.joint_names
+    original = chain.original_assembly(limb)
+    found.append(original.view(chain.ORIGINAL, TITLES[chain.ORIGINAL], [chain.ORIGINAL], members=joints))
+    transformed = Assembly()
+    for relation in chain.transformed_relations(limb):
+        transformed.add(relation)
+    found.append(transformed.view(chain.TRANSFORMED, TITLES[chain.TRANSFORMED], [chain.TRANSFORMED], members=joints))
+    for relation in [*chain.interface(limb, chain.INTERFACE), *chain.transformed_relations(limb)]:
+        assembly.add(relation)
+    every = (*MUSCLE_LEVELS, chain.INTERFACE, chain.TRANSFORMED)
+    found.append(assembly.view(MODEL, TITLES[MODEL], every, members=[limb.name]))
+    return [one for one in found if level is None or one.name == level]
+
+
+def sets_of_units(limb: Limb, assembly: Assembly) -> Iterator[EquationSet]:
+    """Sarcomeres and motor units, one set for each choice of laws."""
+    for level, processes in ((SARCOMERE, ("sarcomere",)), (UNIT, UNIT_LAWS)):
+        alike: dict[tuple[Law, ...], list[str]] = {}
+        for muscle in limb.muscles:
+            for unit in muscle.units:
+                laws = tuple(unit.laws[process].law for process in processes)
+                alike.setdefault(laws, []).append(unit_owner(muscle, unit))
+        for laws, owners in alike.items():
+            names = {process: law.name for process, law in zip(processes, laws, strict=True)}
+            yield owned_view(assembly, level, [level], {owners[0]}, names, owners)
+
+
+def sets_of_muscles(limb: Limb, assembly: Assembly) -> Iterator[EquationSet]:
+    """Muscles, tendons and aponeuroses, one set for each choice of laws; then muscles with all that is in them."""
+
+    def grouped(key: Callable[[Muscle], object]) -> list[list[Muscle]]:
+        alike: dict[object, list[Muscle]] = {}
+        for muscle in limb.muscles:
+            alike.setdefault(key(muscle), []).append(muscle)
+        return list(alike.values())
+
+    def laws_of(muscle: Muscle, processes: Sequence[str]) -> tuple[Law, ...]:
+        return tuple(muscle.laws[process].law for process in processes)
+
+    def recruitment(muscle: Muscle) -> tuple[Law, ...]:
+        return tuple(unit.laws["recruitment"].law for unit in muscle.units)
+
+    def names(muscle: Muscle, processes: Sequence[str]) -> dict[str, str]:
+        return {process: muscle.laws[process].law.name for process in processes}
+
+    for group in grouped(lambda m: (laws_of(m, MUSCLE_LAWS), recruitment(m))):
+        first = group[0]
+        laws = names(first, MUSCLE_LAWS) | {"recruitment": first.units[0].laws["recruitment"].law.name}
+        yield owned_view(assembly, MUSCLE, [MUSCLE], owners_of(first), laws, [m.name for m in group])
+    for level in (TENDON, APONEUROSIS):
+        for group in grouped(lambda m, level=level: m.laws[level].law):  # type: ignore[misc]
+            first = group[0]
+            members = [m.name for m in group]
+            view = owned_view(assembly, level, [level], owners_of(first), names(first, [level]), members)
+            if view.relations:
+                yield view
+    for group in grouped(
+        lambda m: (
+            tuple(chosen.law for chosen in m.laws.values()),
+            tuple(tuple(chosen.law for chosen in unit.laws.values()) for unit in m.units),
+        )
+    ):
+        first = group[0]
+        laws = {process: chosen.law.name for process, chosen in first.laws.items()}
+        for unit in first.units:
+            for process, chosen in unit.laws.items():
+                kinds = laws.get(process, "").split(", ")
+                laws[process] = ", ".join(dict.fromkeys([*filter(None, kinds), chosen.law.name]))
+        yield owned_view(assembly, ASSEMBLED, MUSCLE_LEVELS, owners_of(first), laws, [m.name for m in group])
+
+
+def owners_of(muscle: Muscle) -> set[str]:
+    """The owners of the variables of a muscle."""
+    return {muscle.name, *(unit_owner(muscle, unit) for unit in muscle.units)}
+
+
+def owned_view(
+    assembly: Assembly,
+    name: str,
+    levels: Sequence[str],
+    owners: set[str],
+    laws: dict[str, str],
+    members: Sequence[str],
+) -> EquationSet:
+    """The equations of one muscle or motor unit in some levels."""
+    return assembly.view(
+        name,
+        TITLES[name],
+        levels,
+        lambda relation: relation.owner in owners,
+        lambda variable: variable.owner in owners,
+        laws,
+        members,
+    )

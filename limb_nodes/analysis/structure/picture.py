@@ -1,0 +1,195 @@
+"""A picture of the structure matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limb_nodes.analysis.structure.findings import Findings
+from limb_nodes.analysis.structure.levels import ASSEMBLED, MODEL
+from limb_nodes.analysis.structure.matrix import DEFINES, OFFERED, Matrix, structure_matrix
+from limb_nodes.analysis.structure.symbols import mathtext, symbol
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+CELL = 0.24  # inches
+GAP = 0.45
+TITLE = 0.75
+LETTER = 0.075
+WIDTH = 17.0
+SORTED_SIZE = 6.2
+DEFINED, USED, SHADE, LOOP = "#1f4e79", "#555555", "#ececec", "#c0392b"
+
+
+class Panel:
+    """One level: its matrix, or its equations in the order of solution, and the room (inches) that it takes."""
+
+    def __init__(self, one: Findings) -> None:
+        self.one = one
+        self.matrix: Matrix | None = None
+        if one.system.name in (ASSEMBLED, MODEL) and one.blocks:
+            self.left, self.top = 0.65, 0.35
+            self.body = (SORTED_SIZE, SORTED_SIZE)
+        else:
+            self.matrix = structure_matrix(one.system)
+            self.left = LETTER * max(len(row) + 2 for row in self.matrix.rows) + 0.15
+            self.top = LETTER * max(len(self.matrix.heading(c)) for c in self.matrix.columns) + 0.15
+            self.body = (CELL * len(self.matrix.columns), CELL * len(self.matrix.rows))
+        self.width = self.left + max(self.body[0], 3.6)
+        self.height = TITLE + self.top + self.body[1]
+
+    def title(self) -> str:
+        """Two lines on the level."""
+        one = self.one
+        laws = ", ".join(dict.fromkeys(one.system.laws.values())) if self.matrix else ", ".join(one.system.members[:1])
+        index = f"index {one.index}" if one.index is not None else "singular"
+        count, unknowns = len(one.system.relations), len(one.system.unknowns)
+        kind = " (ordinary differential equations)" if one.index == 0 else ""
+        second = f"{count} equations, {unknowns} unknowns, {one.degrees_of_freedom} degrees of freedom, {index}{kind}"
+        first = one.system.title if self.matrix else f"{one.system.title}, in the order of solution"
+        return f"{first}{f': {laws}' if laws else ''}\n{second}"
+
+
+def draw(findings: Sequence[Findings], limb_name: str, path: Path) -> None:
+    """Draw every level into one picture."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    panels = [Panel(one) for one in findings]
+    limit = max([WIDTH, *(panel.width + 2 * GAP for panel in panels)])
+    places, width, height = shelves(panels, limit)
+    head = 0.9
+    figure = Figure(figsize=(width, height + head))
+    FigureCanvasAgg(figure)
+    total = height + head
+    for panel, (x, y) in zip(panels, places, strict=True):
+        bottom = total - head - y - panel.height
+        axes = figure.add_axes(
+            (
+                (x + panel.left) / width,
+                bottom / total,
+                panel.body[0] / width,
+                panel.body[1] / total,
+            )
+        )
+        if panel.matrix is None:
+            draw_sorted(axes, panel.one)
+        else:
+            draw_matrix(axes, panel.matrix)
+        figure.text(x / width, (bottom + panel.height - 0.05) / total, panel.title(), va="top", fontsize=9)
+    figure.text(GAP / width, 1.0 - 0.3 / total, f"Structure of {limb_name}", va="top", fontsize=13, weight="bold")
+    figure.text(
+        GAP / width,
+        1.0 - 0.6 / total,
+        "⊗ defines, × uses, (×) another law may use; grey columns (in parentheses) are given from outside",
+        va="top",
+        fontsize=9,
+        color=USED,
+    )
+    figure.savefig(path, dpi=130)
+
+
+def shelves(panels: Sequence[Panel], limit: float) -> tuple[list[tuple[float, float]], float, float]:
+    """Places (inches from the left and the top) of panels in rows, and the size of the whole."""
+    places = []
+    x, y, row, widest = GAP, GAP / 2, 0.0, 0.0
+    for panel in panels:
+        if x > GAP and x + panel.width + GAP > limit:
+            x, y, row = GAP, y + row + GAP, 0.0
+        places.append((x, y))
+        x += panel.width + GAP
+        row = max(row, panel.height)
+        widest = max(widest, x)
+    return places, widest, y + row + GAP
+
+
+def draw_matrix(axes: Axes, matrix: Matrix) -> None:
+    """Equations in rows, variables in columns, as the report prints them."""
+    rows, columns = len(matrix.rows), len(matrix.columns)
+    column_of = {column: j for j, column in enumerate(matrix.columns)}
+    row_of = {row: i for i, row in enumerate(matrix.rows)}
+    axes.set_xlim(-0.5, columns - 0.5)
+    axes.set_ylim(rows - 0.5, -0.5)
+    for column in matrix.external:
+        axes.axvspan(column_of[column] - 0.5, column_of[column] + 0.5, color=SHADE, zorder=0, lw=0)
+    for (row, column), mark in matrix.entries.items():
+        at = (column_of[column], row_of[row])
+        if mark == DEFINES:
+            axes.plot(*at, "o", ms=9, mfc="none", mec=DEFINED, mew=1.2)
+        axes.plot(*at, "x", ms=5.5, mec=DEFINED if mark == DEFINES else USED, mew=1.2)
+        if mark == OFFERED:
+            axes.text(*at, "(   )", ha="center", va="center", fontsize=9, color=USED)
+    axes.set_xticks(range(columns), [mathtext(matrix.heading(c)) for c in matrix.columns], rotation=90, fontsize=8)
+    axes.set_yticks(range(rows), [f"({row})" if row[0].isdigit() else row for row in matrix.rows], fontsize=8)
+    axes.tick_params(top=True, labeltop=True, bottom=False, labelbottom=False, length=0)
+    axes.set_xticks([j - 0.5 for j in range(1, columns)], minor=True)
+    axes.set_yticks([i - 0.5 for i in range(1, rows)], minor=True)
+    axes.grid(which="minor", color="#dddddd", lw=0.5)
+    axes.tick_params(which="minor", length=0, top=False)
+    for spine in axes.spines.values():
+        spine.set_color("#999999")
+
+
+def draw_sorted(axes: Axes, one: Findings) -> None:
+    """Equations and unknowns in the order of solution; what must be solved together is framed."""
+    from matplotlib.patches import Rectangle
+
+    assert one.offsets is not None
+    order = [i for block in one.blocks for i in block.relations]
+    unknowns = [variable for block in one.blocks for variable, _ in block.unknowns]
+    place = {variable: j for j, variable in enumerate(unknowns)}
+    times, highest = one.offsets.times, one.offsets.highest
+    count = len(order)
+    now: list[tuple[int, int]] = []
+    states: list[tuple[int, int]] = []
+    for i, relation in enumerate(order):
+        for variable, derivative in one.incidences[relation].items():
+            current = derivative + times[relation] == highest[variable]
+            (now if current else states).append((place[variable], i))
+    size = max(0.6, min(5.0, 330.0 / count))
+    for points, colour in ((states, "#c9a227"), (now, USED)):
+        axes.plot([x for x, _ in points], [y for _, y in points], "s", ms=size, color=colour, mew=0)
+    axes.plot(range(count), range(count), "s", ms=size, color=DEFINED, mew=0)
+    start = 0
+    for block in one.blocks:
+        extent = len(block.relations)
+        if extent > 1:
+            axes.add_patch(Rectangle((start - 0.5, start - 0.5), extent, extent, fill=False, ec=LOOP, lw=1.3))
+            first = one.system.relations[block.relations[0]].owner.split(".")[0]
+            left = start > 0.6 * count
+            axes.text(
+                start - 1.0 if left else start + extent,
+                start + extent / 2,
+                f"{extent} together ({first})",
+                ha="right" if left else "left",
+                va="center",
+                fontsize=7.5,
+                color=LOOP,
+            )
+        start += extent
+    axes.set_xlim(-1, count)
+    axes.set_ylim(count, -1)
+    axes.set_ylabel("equations", fontsize=8)
+    axes.tick_params(labelsize=7, length=2)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    if count <= 60:
+        labels = [one.system.relations[i].label for i in order]
+        axes.set_yticks(range(count), labels, fontsize=5.5)
+        axes.set_xticks(range(count), [mathtext(symbol(v.name)) for v in unknowns], fontsize=5.5, rotation=90)
+        axes.tick_params(top=True, labeltop=True, bottom=False, labelbottom=False, length=0)
+        axes.set_ylabel("")
+    else:
+        axes.set_xlabel("unknowns", fontsize=8)
+    axes.text(
+        0.99,
+        0.99,
+        "on the diagonal: what each equation gives\ngrey: used; yellow: known states",
+        transform=axes.transAxes,
+        ha="right",
+        va="top",
+        fontsize=7,
+        color=USED,
+    )

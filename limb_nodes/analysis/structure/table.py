@@ -1,0 +1,225 @@
+"""The structure of a limb as text."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from limb_nodes.analysis.structure.findings import Block, Findings
+from limb_nodes.analysis.structure.levels import ASSEMBLED, MODEL
+from limb_nodes.analysis.structure.matrix import MARKS, Matrix, structure_matrix
+from limb_nodes.analysis.structure.relations import Relation, Variable
+from limb_nodes.analysis.structure.symbols import symbol
+
+TIMES = {1: "once", 2: "twice"}
+TELLING = ("sarcomere", "tendon", "aponeurosis")
+MEMBERS = 12
+PRIME = "'"
+LEGEND = (
+    "⊗ the equation defines the variable, × it uses it, (×) another law of this process may use it; "
+    "(variable) is given from outside."
+)
+
+
+def report(findings: Sequence[Findings], limb_name: str, width: int, every_matrix: bool = False) -> str:
+    """Everything as text of at most `width` columns.
+
+    every_matrix: print those of the assembled muscle and the whole model too, which hold those of the other levels.
+    """
+    parts = [f"structure of {limb_name}", "", summary(findings)]
+    parts += ["", *wrapped(LEGEND, width, "")]
+    for one in findings:
+        parts += ["", *level_lines(one, width, every_matrix)]
+    return "\n".join(parts)
+
+
+def summary(findings: Iterable[Findings]) -> str:
+    """One line for each level."""
+    rows = [("level", "laws", "equations", "unknowns", "dof", "index", "largest block", "kind")]
+    for one in findings:
+        system = one.system
+        shown = TELLING if system.name == ASSEMBLED else system.laws
+        laws = ", ".join(system.laws[process] for process in shown)
+        loops = [len(block.relations) for block in one.loops]
+        largest = f"{max(loops)}" if loops else "1" if one.blocks else "-"
+        rows.append(
+            (
+                system.name,
+                laws,
+                str(len(system.relations)),
+                str(len(system.unknowns)),
+                str(one.degrees_of_freedom),
+                "-" if one.index is None else str(one.index),
+                largest,
+                one.kind,
+            )
+        )
+    return "\n".join(columns(rows, right=(2, 3, 4, 5, 6)))
+
+
+def columns(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> list[str]:
+    """Lines of a table with aligned columns."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    return [
+        "  ".join(
+            cell.rjust(width) if i in right else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
+
+
+def level_lines(one: Findings, width: int, every_matrix: bool) -> list[str]:
+    """What is found about one level."""
+    system = one.system
+    laws = "; ".join(f"{process.replace('_', ' ')}: {law}" for process, law in system.laws.items())
+    lines = [system.title, "=" * len(system.title)]
+    if laws:
+        lines += wrapped(f"laws: {laws}", width)
+    if system.members:
+        more = len(system.members) - MEMBERS
+        members = ", ".join(system.members[:MEMBERS]) + (f" and {more} more" if more > 0 else "")
+        lines += wrapped(f"of: {members}", width)
+    count = len(system.relations)
+    lines.append(
+        f"{plural(count, 'equation')}, {plural(len(system.unknowns), 'unknown')}, "
+        f"{one.degrees_of_freedom} degrees of freedom; "
+        + (f"{one.kind}, index {one.index}" if one.index is not None else one.kind)
+    )
+    lines += blame_lines(one, width)
+    if one.offsets:
+        if one.offsets.free_initial_values:
+            lines.append(f"initial values that may be chosen: {one.offsets.free_initial_values}")
+        lines += block_lines(one, width)
+    if system.name in (ASSEMBLED, MODEL) and not every_matrix:
+        lines.append(f"matrix of {count} x {len(system.unknowns)}: --level {system.name}, --json, and the picture (-o)")
+        return lines
+    return [*lines, "", *matrix_lines(structure_matrix(system), width)]
+
+
+def blame_lines(one: Findings, width: int) -> list[str]:
+    """The equations and variables to blame for a system that cannot be solved as it stands."""
+    lines: list[str] = []
+    (over_equations, over_unknowns), (under_equations, under_unknowns) = one.parts.over, one.parts.under
+    relations = one.system.relations
+    if over_equations:
+        lines += wrapped(
+            f"over-determined: {len(over_equations)} equations for {len(over_unknowns)} unknowns: equations "
+            f"{equation_names([relations[i] for i in over_equations])}; unknowns {variable_names(over_unknowns)}",
+            width,
+        )
+    if under_unknowns:
+        lines += wrapped(
+            f"under-determined: {len(under_unknowns)} unknowns in {len(under_equations)} equations: unknowns "
+            f"{variable_names(under_unknowns)}; equations {equation_names([relations[i] for i in under_equations])}",
+            width,
+        )
+    for variable, several in one.defined_twice.items():
+        lines += wrapped(f"{variable_names([variable])} is defined more than once: {equation_names(several)}", width)
+    if one.undefined:
+        lines += wrapped(f"on no left-hand side: {variable_names(one.undefined)}", width)
+    if one.differentiated:
+        counts: dict[int, list[Relation]] = {}
+        for i, times in one.differentiated.items():
+            counts.setdefault(times, []).append(relations[i])
+        text = "; ".join(
+            f"{equation_names(several)} {TIMES.get(times, f'{times} times')}"
+            for times, several in sorted(counts.items(), reverse=True)
+        )
+        lines += wrapped(f"to be differentiated: {text}", width)
+        assert one.offsets is not None
+        shown: dict[str, None] = {}
+        for rows, unknowns in one.offsets.constraints:
+            labels = counted([relations[i].label + PRIME * times for i, times in rows])
+            held = counted([symbol(variable.name) + PRIME * order for variable, order in unknowns])
+            verb = "holds" if len(rows) == 1 else "together hold"
+            shown.setdefault(f"{labels} {verb} only {held}" if held else f"{labels} {verb} nothing but states")
+        for text in shown:
+            lines += wrapped(f"constraint: {text}", width)
+    return lines
+
+
+def block_lines(one: Findings, width: int) -> list[str]:
+    """The blocks of more than one equation."""
+    if not one.loops:
+        return ["every equation can be solved on its own, one after the other"]
+    lines = []
+    alike = Counter(block_text(one, block) for block in one.loops)
+    for text, count in alike.items():
+        lines += wrapped(f"{f'{count} blocks, each' if count > 1 else 'block'} to be solved together: {text}", width)
+    return lines
+
+
+def block_text(one: Findings, block: Block) -> str:
+    """The equations of a block, each with the unknown that it gives; primes mark derivatives."""
+    times = one.differentiated
+    pairs = [
+        f"{one.system.relations[i].label}{PRIME * times.get(i, 0)} → {symbol(variable.name)}{PRIME * order}"
+        for i, (variable, order) in zip(block.relations, block.unknowns, strict=True)
+    ]
+    return counted(pairs)
+
+
+def equation_names(relations: Iterable[Relation]) -> str:
+    """Labels of equations, each once, with the number of equations that share it."""
+    return counted([relation.label for relation in relations])
+
+
+def variable_names(variables: Iterable[Variable]) -> str:
+    """Symbols of variables, each once, with the number of variables that share it."""
+    return counted([symbol(variable.name) for variable in variables])
+
+
+def counted(texts: Sequence[str]) -> str:
+    """Texts, each once, with how often it occurs where that is more than once."""
+    return ", ".join(f"{text} [{count}]" if count > 1 else text for text, count in Counter(texts).items())
+
+
+def matrix_lines(matrix: Matrix, width: int) -> list[str]:
+    """The matrix; where it is wider than `width`, several tables, without the rows that are empty there."""
+    head = max(len(row) for row in matrix.rows) + 2
+    tables: list[list[str]] = [[]]
+    used = head
+    for column in matrix.columns:
+        cell = len(matrix.heading(column)) + 2
+        if used + cell > width and tables[-1]:
+            tables.append([])
+            used = head
+        tables[-1].append(column)
+        used += cell
+    lines: list[str] = []
+    for number, table in enumerate(tables):
+        rows = [["", *(matrix.heading(column) for column in table)]]
+        for row in matrix.rows:
+            if len(tables) > 1 and not any((row, c) in matrix.entries for c in table):
+                continue
+            marks = [MARKS[matrix.entries[row, c]] if (row, c) in matrix.entries else "·" for c in table]
+            rows.append([f"({row})" if row[0].isdigit() else row, *marks])
+        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+        lines += [""] if number else []
+        lines += [
+            "  ".join(
+                cell.center(size) if i else cell.ljust(size)
+                for i, (cell, size) in enumerate(zip(row, widths, strict=True))
+            ).rstrip()
+            for row in rows
+        ]
+    return lines
+
+
+def plural(count: int, word: str) -> str:
+    """A number of things."""
+    return f"{count} {word}{'s' if count != 1 else ''}"
+
+
+def wrapped(text: str, width: int, indent: str = "  ") -> list[str]:
+    """Lines of a text, the later ones indented."""
+    lines: list[str] = []
+    line = ""
+    for word in text.split(" "):
+        if line and len(line) + 1 + len(word) > width:
+            lines.append(line)
+            line = indent + word
+        else:
+            line = f"{line} {word}" if line else word
+    return [*lines, line]

@@ -1,0 +1,59 @@
+"""`limb structure`: degrees of freedom, index, structure matrices and blocks of a limb's equations."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+from pathlib import Path
+
+from limb_nodes.analysis.structure import TITLES, analyse
+from limb_nodes.analysis.structure.plain import plain
+from limb_nodes.analysis.structure.table import report
+from limb_nodes.errors import UserError
+from limb_nodes.model import load_limb
+
+PICTURES = (".png", ".pdf", ".svg")
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the arguments of `limb structure`."""
+    parser = subparsers.add_parser(
+        "structure",
+        help="degrees of freedom, index and structure matrices of a limb's equations",
+        description="Count the equations and unknowns of every level of a limb, and find from their structure the "
+        "degrees of freedom, the differential index, and which equations must be solved together. Exit status 1 where "
+        "what is solved (all but the original form of the limb) is singular or has an index above 1.",
+    )
+    parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
+    parser.add_argument("--level", choices=list(TITLES), help="this level only, with its whole matrix")
+    parser.add_argument("--json", action="store_true", help="print JSON; docs/structure.md lists its keys")
+    parser.add_argument("-o", "--out", metavar="FILE.png", help=f"draw the matrices; {', '.join(PICTURES)}")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print and draw; 1 where what is solved cannot be solved as it stands."""
+    out = Path(args.out) if args.out else None
+    if out and out.suffix.lower() not in PICTURES:
+        raise UserError(f"--out {args.out}: the name of a picture ends in {', '.join(PICTURES)}")
+    limb = load_limb(args.limb)
+    findings = analyse(limb, args.level)
+    if not findings:
+        raise UserError(f"{args.limb}: --level {args.level}: no muscle of this limb has this level")
+    if out:
+        from limb_nodes.analysis.structure.picture import draw
+
+        try:
+            draw(findings, limb.name, out)
+        except OSError as problem:
+            raise UserError(f"--out {args.out}: cannot be written: {problem.strerror or problem}") from None
+    if args.json:
+        text = json.dumps(plain(findings, limb.name, args.limb), indent=1)
+    else:
+        text = report(findings, limb.name, max(60, shutil.get_terminal_size((110, 24)).columns), bool(args.level))
+        if out:
+            text += f"\n\npicture: {out}"
+    encoding = sys.stdout.encoding or "utf-8"
+    print(text.encode(encoding, "replace").decode(encoding))
+    return 0 if all(one.sound for one in findings if one.system.name != "limb_original") else 1
