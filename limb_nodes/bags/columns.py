@@ -31,7 +31,7 @@ def columns(messages: Sequence[bytes], msgtype: str, store: Typestore) -> Column
         ValueError: the messages differ in shape or names.
     """
     first = messages[0]
-    layout = _Layout(first, store)
+    layout = Layout(first, store)
     layout.message(msgtype, "")
     size = len(first)
     if any(len(message) != size for message in messages):
@@ -49,7 +49,7 @@ def columns(messages: Sequence[bytes], msgtype: str, store: Typestore) -> Column
     return {name: found[name] for name in layout.order}
 
 
-class _Layout:
+class Layout:
     """Walks through one message in CDR and notes where each field is.
 
     Attributes:

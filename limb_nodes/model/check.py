@@ -11,7 +11,7 @@ from limb_nodes.levels.sarcomere.lengths import (
     minimum_sarcomere_length,
     optimal_sarcomere_length,
 )
-from limb_nodes.model.choice import ChosenLaw
+from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Muscle, Segment
 from limb_nodes.model.section import Section
 

@@ -2,24 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
-
 from limb_nodes.levels import CONTRACTS, REGISTRY, Law, Parameter
+from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.section import Section, one_line
-
-
-@dataclass(frozen=True)
-class ChosenLaw:
-    """A law with the values of its parameters (SI units) and the place where it was chosen."""
-
-    law: Law
-    values: dict[str, float]
-    place: str
+from limb_nodes.model.user_code import import_user_module, user_folders
 
 
 def choose_law(section: Section, key: str, process: str, shared: tuple[Parameter, ...] = ()) -> ChosenLaw:
@@ -41,7 +27,7 @@ def choose_law(section: Section, key: str, process: str, shared: tuple[Parameter
 
 def read_law(section: Section, process: str, shared: tuple[Parameter, ...] = ()) -> ChosenLaw:
     """Read law and parameters from a section that holds nothing else."""
-    law = find_law(section, process)
+    law, module = find_law(section, process)
     values: dict[str, float] = {}
     parameters = (*shared, *law.parameters)
     for parameter in parameters:
@@ -52,42 +38,30 @@ def read_law(section: Section, process: str, shared: tuple[Parameter, ...] = ())
         if parameter.name not in values and isinstance(parameter.default, str):
             values[parameter.name] = values[parameter.default]
     section.finish()
-    return ChosenLaw(law, values, section.place)
+    return ChosenLaw(law, values, section.place, module)
 
 
-def find_law(section: Section, process: str) -> Law:
-    """The law that `section.law` names; UserError where there is none."""
+def find_law(section: Section, process: str) -> tuple[Law, str]:
+    """The law that `section.law` names, and the user's module it is in; UserError where there is none."""
     known = REGISTRY[process]
     name = section.text("law", CONTRACTS[process].default)
     if name in known:
-        return known[name]
+        return known[name], ""
     if ":" not in name:
         section.fail(
             "law",
             f"is {name!r}; allowed: {', '.join(sorted(known))}, or an import path module:name",
         )
     module_name, _, attribute = name.partition(":")
-    with importable(Path(section.file).resolve().parent):
-        try:
-            module = importlib.import_module(module_name.removesuffix(".py"))
-        except Exception as problem:
-            section.fail("law", f"is {name!r}; it cannot be imported: {one_line(problem) or 'error'}")
+    module_name = module_name.removesuffix(".py")
+    try:
+        module = import_user_module(module_name, user_folders(section.file))
+    except Exception as problem:
+        section.fail("law", f"is {name!r}; it cannot be imported: {one_line(problem) or type(problem).__name__}")
     found = getattr(module, attribute, None)
     if not isinstance(found, Law):
         section.fail("law", f"is {name!r}; {attribute} in {module_name} is no law")
     elif found.process != process:
         section.fail("law", f"is {name!r}, a law of {found.process}; a law of {process} is needed")
     assert isinstance(found, Law)
-    return found
-
-
-@contextmanager
-def importable(folder: Path) -> Iterator[None]:
-    """Let modules beside the limb's file and in the working folder be imported."""
-    extra = [str(folder), str(Path.cwd())]
-    sys.path[:0] = extra
-    try:
-        yield
-    finally:
-        for entry in extra:
-            sys.path.remove(entry)
+    return found, module_name

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from limb_nodes.model.choice import ChosenLaw
+from limb_nodes.model.chosen import ChosenLaw
 
 
 @dataclass(frozen=True)

@@ -12,39 +12,14 @@ from std_msgs.msg import Header
 from limb_nodes.nodes.base import LimbNode, finite, floats
 from limb_nodes.nodes.qos import STREAM
 from limb_nodes.nodes.running import main_of
-from limb_nodes.solve.generate import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.outputs import (
+    MUSCLE_FIELDS,
+    MUSCLE_OUTPUTS,
+    SARCOMERE_FIELDS,
+    UNIT_FIELDS,
+    UNIT_OUTPUTS,
+)
 from limb_nodes.solve.stepping import MuscleStepper
-
-MUSCLE_FIELDS = {
-    "fibre_force": "total_fibre_force",
-    "torque": "muscle_torque",
-    **{
-        name: name
-        for name in (
-            "muscle_tendon_length",
-            "muscle_tendon_velocity",
-            "muscle_length",
-            "muscle_velocity",
-            "tendon_length",
-            "tendon_velocity",
-            "aponeurosis_length",
-            "aponeurosis_velocity",
-            "pennation_angle",
-            "fibre_length",
-            "fibre_velocity",
-            "muscle_force",
-        )
-    },
-}
-UNIT_FIELDS = {
-    "stimulation_frequency": "stimulation_frequency",
-    "force_frequency_factor": "force_frequency_factor",
-    "force_length_factor": "force_length_factor",
-    "passive_force": "passive_force",
-    "force": "fibre_force",
-}
-SARCOMERE_FIELDS = {"length": "sarcomere_length", "velocity": "sarcomere_velocity", "force": "sarcomere_force"}
-
 
 class MuscleStack(LimbNode):
     """Answers joint_states k with joint_torque k once it holds the activations k and k + 1.
@@ -69,9 +44,6 @@ class MuscleStack(LimbNode):
         self.muscles = self.limb.muscle_names
         self.owners = [muscle.name for muscle in self.limb.muscles for _ in muscle.units]
         self.units = [unit.name for muscle in self.limb.muscles for unit in muscle.units]
-        self.most_passive = np.array(
-            [unit.values["maximum_passive_force"] for muscle in self.limb.muscles for unit in muscle.units]
-        )
         n = len(self.limb.segments)
         self.tick = -1
         self.angle, self.velocity = np.zeros(n), np.zeros(n)
@@ -170,7 +142,6 @@ class MuscleStack(LimbNode):
         muscles, units = self.stepper.observe(self.angle, self.velocity, excitation)
         muscle = {name: muscles[:, index] for index, name in enumerate(MUSCLE_OUTPUTS)}
         unit = {name: units[:, index] for index, name in enumerate(UNIT_OUTPUTS)}
-        unit["passive_force"] = unit["passive_force_factor"] * self.most_passive
         for topic, kind, names, fields, columns in (
             ("muscle_state", MuscleState, {"name": self.muscles}, MUSCLE_FIELDS, muscle),
             ("motor_unit_state", MotorUnitState, {"muscle": self.owners, "unit": self.units}, UNIT_FIELDS, unit),

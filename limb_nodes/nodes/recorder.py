@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
-import platform
 import struct
 import time
 from collections.abc import Callable
@@ -25,8 +23,8 @@ from rclpy.parameter_client import AsyncParameterClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int64, String
 
-from limb_nodes import __version__
 from limb_nodes.bags.types import TOPIC_TYPES
+from limb_nodes.bags.versions import versions
 from limb_nodes.bags.write import BagWriter, refuse_existing
 from limb_nodes.errors import UserError
 from limb_nodes.nodes.base import NODES, LimbNode
@@ -48,7 +46,6 @@ OTHERS = {"emg_envelope": MuscleActivation, "external_load": WrenchStamped, "/di
 PROGRESS_EVERY = 32
 # How long to wait for the other nodes to tell their parameters once messages flow (s).
 PATIENCE = 5.0
-PACKAGES = ("numpy", "numba", "rosbags", "ros-rclpy", "scipy")
 
 
 class Recorder(LimbNode):
@@ -215,17 +212,6 @@ def is_last(data: bytes) -> bool:
 def own_parameters(node: LimbNode) -> dict[str, Any]:
     """The parameters of this node."""
     return {name: parameter.value for name, parameter in node._parameters.items()}
-
-
-def versions() -> dict[str, str]:
-    """Versions of what a run's numbers depend on."""
-    found = {"limb_nodes": __version__, "python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            continue
-    return found
 
 
 main: Callable[..., None] = main_of(Recorder)

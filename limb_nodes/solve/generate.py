@@ -20,6 +20,7 @@ from limb_nodes.model.layout import (
     UnitKind,
 )
 from limb_nodes.model.system import BoundEquation
+from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.tangent import (
     function_tree,
     global_constants,
@@ -27,35 +28,6 @@ from limb_nodes.solve.tangent import (
     tangent_source,
 )
 
-MUSCLE_OUTPUTS = (
-    "activation",
-    "muscle_tendon_length",
-    "muscle_tendon_velocity",
-    "muscle_length",
-    "muscle_velocity",
-    "tendon_length",
-    "tendon_velocity",
-    "aponeurosis_length",
-    "aponeurosis_velocity",
-    "pennation_angle",
-    "fibre_length",
-    "fibre_velocity",
-    "total_fibre_force",
-    "muscle_force",
-    "moment_arm",
-    "muscle_torque",
-)
-UNIT_OUTPUTS = (
-    "stimulation_frequency",
-    "force_frequency_factor",
-    "force_length_factor",
-    "passive_force_factor",
-    "fibre_force",
-    "fibre_length_norm",
-    "sarcomere_length",
-    "sarcomere_velocity",
-    "sarcomere_force",
-)
 INLINE = '@njit(error_model="numpy")\n'
 
 
@@ -255,6 +227,7 @@ def unit_observe(equations: Equations, number: int, kind: UnitKind, states: list
     body.load(states, used, "x[xo + ")
     for stage in stages:
         body.compute(stage)
+    body.add("passive_force = passive_force_factor * maximum_passive_force")
     body.add(*(f"out[oo + {i}] = {name}" for i, name in enumerate(UNIT_OUTPUTS)))
     body.add("return 0")
     return body.function(f"unit{number}_observe", "fibre_length, fibre_velocity, activation, p, o, x, xo, out, oo")

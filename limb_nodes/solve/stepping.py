@@ -14,7 +14,7 @@ import numpy as np
 from limb_nodes.model.layout import FloatArray
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve import explicit
-from limb_nodes.solve.generate import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.whole import FAILURES, SolveError, WholeModel
 
 TICK_TOLERANCE = 1e-9

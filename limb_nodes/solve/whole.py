@@ -12,7 +12,7 @@ from limb_nodes.model.layout import FloatArray, Layout, build_layout
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve import explicit
 from limb_nodes.solve.compile import compiled
-from limb_nodes.solve.generate import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 
 ANGLE_SCALE, VELOCITY_SCALE = 1.0, 10.0
 TOLERANCE = 1e-9

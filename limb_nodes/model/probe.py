@@ -1,0 +1,97 @@
+"""A law evaluated in plain Python at points of its variables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from limb_nodes.levels import Equation, sarcomere
+from limb_nodes.model.choice import ChosenLaw
+
+
+class BrokenLaw(Exception):
+    """A law that cannot be evaluated; the text says why."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One equation with the symbols of its arguments; the law's parameters start with a colon."""
+
+    equation: Equation
+    symbols: tuple[str, ...]
+
+
+class Probe:
+    """The equations of one law with the values of its parameters.
+
+    given: the variables that will be given at every point.
+    constants: variables that stay the same.
+    Raises BrokenLaw where an equation uses what is neither given nor defined, or where the
+    equations define each other.
+    """
+
+    def __init__(self, chosen: ChosenLaw, given: Iterable[str], constants: Mapping[str, float]) -> None:
+        own = {f":{name}": value for name, value in chosen.values.items()}
+        equations = chosen.law.equations
+        if chosen.law.process == "sarcomere":
+            equations = (*sarcomere.EQUATIONS, *equations)
+        waiting = [
+            Step(item, tuple(f":{name}" if f":{name}" in own else name for name in item.uses)) for item in equations
+        ]
+        self.start: dict[str, float] = {**constants, **own}
+        self.steps: list[Step] = []
+        varying = set(given) - set(constants)
+        known = {*self.start, *varying}
+        while waiting:
+            ready = [step for step in waiting if known.issuperset(step.symbols)]
+            if not ready:
+                raise BrokenLaw(missing(waiting, known))
+            for step in ready:
+                if varying.isdisjoint(step.symbols):
+                    self.start[step.equation.defines] = evaluate(step, self.start)
+                else:
+                    self.steps.append(step)
+                    varying.add(step.equation.defines)
+                known.add(step.equation.defines)
+            waiting = [step for step in waiting if step not in ready]
+        self.varying = varying
+
+    def uses(self, variable: str) -> bool:
+        """Whether any equation uses a given variable."""
+        return any(variable in step.symbols for step in self.steps)
+
+    def at(self, **point: float) -> dict[str, float]:
+        """All variables at a point."""
+        values = {**self.start, **point}
+        for step in self.steps:
+            values[step.equation.defines] = evaluate(step, values)
+        return values
+
+
+def evaluate(step: Step, values: Mapping[str, float]) -> float:
+    """The value of an equation; NaN where its arithmetic fails, as when it is compiled."""
+    try:
+        value = step.equation.function(*[values[symbol] for symbol in step.symbols])
+    except (ArithmeticError, ValueError):
+        return math.nan
+    except Exception as problem:
+        if any(values[symbol] != values[symbol] for symbol in step.symbols):
+            return math.nan
+        raise BrokenLaw(f"equation {step.equation.number} fails: {type(problem).__name__}: {problem}") from None
+    # A negative number to a broken power is complex in Python and NaN in compiled code.
+    if isinstance(value, complex):
+        return math.nan
+    if not isinstance(value, int | float):
+        raise BrokenLaw(f"equation {step.equation.number} returns {value!r}, not a number")
+    return float(value)
+
+
+def missing(waiting: list[Step], known: set[str]) -> str:
+    """What keeps equations from being evaluated."""
+    defined = {step.equation.defines for step in waiting}
+    for step in waiting:
+        for symbol in step.symbols:
+            if symbol not in known and symbol not in defined:
+                return f"equation {step.equation.number} uses {symbol}, which is neither given nor defined"
+    return f"the equations of {', '.join(sorted(defined))} use each other"
