@@ -16,10 +16,12 @@ if TYPE_CHECKING:
 
 CELL = 0.24  # inches
 GAP = 0.45
-TITLE = 0.75
+TITLE = 0.55
 LETTER = 0.075
-WIDTH = 17.0
+WIDTH = 22.5
 SORTED_SIZE = 6.2
+BELOW = 0.5
+LABELLED = 60
 DEFINED, USED, SHADE, LOOP = "#1f4e79", "#555555", "#ececec", "#c0392b"
 
 
@@ -30,15 +32,17 @@ class Panel:
         self.one = one
         self.matrix: Matrix | None = None
         if one.system.name in (ASSEMBLED, MODEL) and one.blocks:
-            self.left, self.top = 0.65, 0.35
+            labels = [relation.label for relation in one.system.relations] if len(one.blocks) <= LABELLED else [""]
+            self.left, self.top = 0.045 * max(map(len, labels)) + 0.35, 0.35
             self.body = (SORTED_SIZE, SORTED_SIZE)
         else:
             self.matrix = structure_matrix(one.system)
             self.left = LETTER * max(len(row) + 2 for row in self.matrix.rows) + 0.15
-            self.top = LETTER * max(len(self.matrix.heading(c)) for c in self.matrix.columns) + 0.15
+            self.top = LETTER * max(len(self.matrix.heading(c)) for c in self.matrix.columns) * 0.75 + 0.1
             self.body = (CELL * len(self.matrix.columns), CELL * len(self.matrix.rows))
-        self.width = self.left + max(self.body[0], 3.6)
-        self.height = TITLE + self.top + self.body[1]
+        self.width = max(self.left + self.body[0], LETTER * max(len(line) for line in self.title().split("\n")))
+        self.bottom = 0.0 if self.matrix else BELOW
+        self.height = TITLE + self.top + self.body[1] + self.bottom
 
     def title(self) -> str:
         """Two lines on the level."""
@@ -46,8 +50,8 @@ class Panel:
         laws = ", ".join(dict.fromkeys(one.system.laws.values())) if self.matrix else ", ".join(one.system.members[:1])
         index = f"index {one.index}" if one.index is not None else "singular"
         count, unknowns = len(one.system.relations), len(one.system.unknowns)
-        kind = " (ordinary differential equations)" if one.index == 0 else ""
-        second = f"{count} equations, {unknowns} unknowns, {one.degrees_of_freedom} degrees of freedom, {index}{kind}"
+        kind = " (ODE)" if one.index == 0 else ""
+        second = f"{count} equations, {unknowns} unknowns, dof {one.degrees_of_freedom}, {index}{kind}"
         first = one.system.title if self.matrix else f"{one.system.title}, in the order of solution"
         return f"{first}{f': {laws}' if laws else ''}\n{second}"
 
@@ -57,7 +61,7 @@ def draw(findings: Sequence[Findings], limb_name: str, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    panels = [Panel(one) for one in findings]
+    panels = sorted((Panel(one) for one in findings), key=lambda panel: panel.matrix is None)
     limit = max([WIDTH, *(panel.width + 2 * GAP for panel in panels)])
     places, width, height = shelves(panels, limit)
     head = 0.9
@@ -65,7 +69,7 @@ def draw(findings: Sequence[Findings], limb_name: str, path: Path) -> None:
     FigureCanvasAgg(figure)
     total = height + head
     for panel, (x, y) in zip(panels, places, strict=True):
-        bottom = total - head - y - panel.height
+        bottom = total - head - y - panel.height + panel.bottom
         axes = figure.add_axes(
             (
                 (x + panel.left) / width,
@@ -78,7 +82,7 @@ def draw(findings: Sequence[Findings], limb_name: str, path: Path) -> None:
             draw_sorted(axes, panel.one)
         else:
             draw_matrix(axes, panel.matrix)
-        figure.text(x / width, (bottom + panel.height - 0.05) / total, panel.title(), va="top", fontsize=9)
+        figure.text(x / width, (total - head - y - 0.05) / total, panel.title(), va="top", fontsize=9)
     figure.text(GAP / width, 1.0 - 0.3 / total, f"Structure of {limb_name}", va="top", fontsize=13, weight="bold")
     figure.text(
         GAP / width,
@@ -92,13 +96,21 @@ def draw(findings: Sequence[Findings], limb_name: str, path: Path) -> None:
 
 
 def shelves(panels: Sequence[Panel], limit: float) -> tuple[list[tuple[float, float]], float, float]:
-    """Places (inches from the left and the top) of panels in rows, and the size of the whole."""
+    """Places (inches from the left and the top) of panels in rows, low ones below each other, and the whole size."""
     places = []
     x, y, row, widest = GAP, GAP / 2, 0.0, 0.0
+    stacks: list[list[float]] = []
     for panel in panels:
+        below = next((s for s in stacks if panel.width <= s[1] and s[2] + GAP + panel.height <= row), None)
+        if below is not None:
+            places.append((below[0], y + below[2] + GAP))
+            below[2] += GAP + panel.height
+            continue
         if x > GAP and x + panel.width + GAP > limit:
             x, y, row = GAP, y + row + GAP, 0.0
+            stacks = []
         places.append((x, y))
+        stacks.append([x, panel.width, panel.height])
         x += panel.width + GAP
         row = max(row, panel.height)
         widest = max(widest, x)
@@ -118,7 +130,7 @@ def draw_matrix(axes: Axes, matrix: Matrix) -> None:
         at = (column_of[column], row_of[row])
         if mark == DEFINES:
             axes.plot(*at, "o", ms=9, mfc="none", mec=DEFINED, mew=1.2)
-        axes.plot(*at, "x", ms=5.5, mec=DEFINED if mark == DEFINES else USED, mew=1.2)
+        axes.plot(*at, "x", ms=5, mec=DEFINED if mark == DEFINES else USED, mew=1.2)
         if mark == OFFERED:
             axes.text(*at, "(   )", ha="center", va="center", fontsize=9, color=USED)
     axes.set_xticks(range(columns), [mathtext(matrix.heading(c)) for c in matrix.columns], rotation=90, fontsize=8)
@@ -152,16 +164,17 @@ def draw_sorted(axes: Axes, one: Findings) -> None:
     for points, colour in ((states, "#c9a227"), (now, USED)):
         axes.plot([x for x, _ in points], [y for _, y in points], "s", ms=size, color=colour, mew=0)
     axes.plot(range(count), range(count), "s", ms=size, color=DEFINED, mew=0)
-    start = 0
+    start, last = 0, -1.0
     for block in one.blocks:
         extent = len(block.relations)
         if extent > 1:
             axes.add_patch(Rectangle((start - 0.5, start - 0.5), extent, extent, fill=False, ec=LOOP, lw=1.3))
             first = one.system.relations[block.relations[0]].owner.split(".")[0]
             left = start > 0.6 * count
+            last = max(start + extent / 2, last + 0.03 * count)
             axes.text(
-                start - 1.0 if left else start + extent,
-                start + extent / 2,
+                start - 0.01 * count if left else start + extent + 0.01 * count,
+                last,
                 f"{extent} together ({first})",
                 ha="right" if left else "left",
                 va="center",
@@ -175,21 +188,10 @@ def draw_sorted(axes: Axes, one: Findings) -> None:
     axes.tick_params(labelsize=7, length=2)
     axes.set_xticks([])
     axes.set_yticks([])
-    if count <= 60:
+    if count <= LABELLED:
         labels = [one.system.relations[i].label for i in order]
         axes.set_yticks(range(count), labels, fontsize=5.5)
         axes.set_xticks(range(count), [mathtext(symbol(v.name)) for v in unknowns], fontsize=5.5, rotation=90)
         axes.tick_params(top=True, labeltop=True, bottom=False, labelbottom=False, length=0)
         axes.set_ylabel("")
-    else:
-        axes.set_xlabel("unknowns", fontsize=8)
-    axes.text(
-        0.99,
-        0.99,
-        "on the diagonal: what each equation gives\ngrey: used; yellow: known states",
-        transform=axes.transAxes,
-        ha="right",
-        va="top",
-        fontsize=7,
-        color=USED,
-    )
+    axes.set_xlabel("unknowns; blue: what each equation gives, grey: what it uses, yellow: known states", fontsize=8)

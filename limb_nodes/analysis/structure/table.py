@@ -12,12 +12,19 @@ from limb_nodes.analysis.structure.relations import Relation, Variable
 from limb_nodes.analysis.structure.symbols import symbol
 
 TIMES = {1: "once", 2: "twice"}
-TELLING = ("sarcomere", "tendon", "aponeurosis")
+# Laws that tell the levels of one name apart, where they are many.
+TELLING = {ASSEMBLED: ("sarcomere", "tendon", "aponeurosis"), "muscle": ("path", "aponeurosis")}
+KINDS = {
+    "algebraic equations": "algebraic",
+    "differential and algebraic equations": "DAE",
+    "ordinary differential equations": "ODE",
+}
 MEMBERS = 12
 PRIME = "'"
 LEGEND = (
     "⊗ the equation defines the variable, × it uses it, (×) another law of this process may use it; "
-    "(variable) is given from outside."
+    "(variable) is given from outside. dof: degrees of freedom, unknowns less equations. index: structural "
+    "differential index. block: the most equations that must be solved together."
 )
 
 
@@ -35,26 +42,25 @@ def report(findings: Sequence[Findings], limb_name: str, width: int, every_matri
 
 def summary(findings: Iterable[Findings]) -> str:
     """One line for each level."""
-    rows = [("level", "laws", "equations", "unknowns", "dof", "index", "largest block", "kind")]
+    rows = [("level", "equations", "unknowns", "dof", "index", "block", "kind", "laws")]
     for one in findings:
         system = one.system
-        shown = TELLING if system.name == ASSEMBLED else system.laws
-        laws = ", ".join(system.laws[process] for process in shown)
-        loops = [len(block.relations) for block in one.loops]
-        largest = f"{max(loops)}" if loops else "1" if one.blocks else "-"
+        sizes = [len(block.relations) for block in one.blocks]
+        kind = "singular" if one.singular else KINDS[one.kind]
+        laws = [system.laws[process] for process in TELLING.get(system.name, tuple(system.laws))]
         rows.append(
             (
                 system.name,
-                laws,
                 str(len(system.relations)),
                 str(len(system.unknowns)),
                 str(one.degrees_of_freedom),
                 "-" if one.index is None else str(one.index),
-                largest,
-                one.kind,
+                str(max(sizes)) if sizes else "-",
+                kind,
+                ", ".join(laws),
             )
         )
-    return "\n".join(columns(rows, right=(2, 3, 4, 5, 6)))
+    return "\n".join(columns(rows, right=(1, 2, 3, 4, 5)))
 
 
 def columns(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> list[str]:
