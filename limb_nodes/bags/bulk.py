@@ -51,7 +51,7 @@ def example(msgtype: str, name: str, value: Any) -> Any:
     """The first value of a field in the form that a message takes."""
     if name == "position" and msgtype.endswith("MovementPattern"):
         return [make_message("geometry_msgs/msg/Point", x=x, y=y, z=z) for x, y, z in value]
-    return value.item() if np.ndim(value) == 0 else value
+    return value.item() if np.ndim(value) == 0 else np.ascontiguousarray(value)
 
 
 def put(rows: npt.NDArray[np.uint8], start: int, values: npt.NDArray[Any]) -> None:

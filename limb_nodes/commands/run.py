@@ -60,9 +60,11 @@ def run(args: argparse.Namespace) -> int:
     with tqdm(
         total=None if final is None else final + 1, unit="tick", disable=not sys.stderr.isatty(), leave=False
     ) as bar:
-        outcome = (run_in_processes if args.processes else run_in_one_process)(
-            ready, lambda tick: bar.update(max(0, tick + 1 - bar.n))
-        )
+
+        def show(tick: int) -> None:
+            bar.update(max(0, tick + 1 - bar.n))
+
+        outcome = (run_in_processes if args.processes else run_in_one_process)(ready, show)
     seconds = (outcome.ticks - 1) / args.rate if outcome.ticks else 0.0
     print(f"ticks      {outcome.ticks} at {args.rate:g} Hz ({seconds:g} s)")
     print(f"missing    {outcome.missing}")

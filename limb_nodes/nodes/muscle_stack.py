@@ -21,6 +21,7 @@ from limb_nodes.solve.outputs import (
 )
 from limb_nodes.solve.stepping import MuscleStepper
 
+
 class MuscleStack(LimbNode):
     """Answers joint_states k with joint_torque k once it holds the activations k and k + 1.
 

@@ -11,6 +11,12 @@ import ast
 from collections.abc import Iterable
 
 from limb_nodes.levels.equation import ScalarFunction
+from limb_nodes.levels.tangent import (
+    function_tree,
+    global_constants,
+    helper_functions,
+    tangent_source,
+)
 from limb_nodes.model.layout import (
     GROUP_INDEX,
     MUSCLE_INDEX,
@@ -21,12 +27,6 @@ from limb_nodes.model.layout import (
 )
 from limb_nodes.model.system import BoundEquation
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
-from limb_nodes.solve.tangent import (
-    function_tree,
-    global_constants,
-    helper_functions,
-    tangent_source,
-)
 
 INLINE = '@njit(error_model="numpy")\n'
 

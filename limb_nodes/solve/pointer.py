@@ -18,11 +18,11 @@ SIGNATURE = types.void(f8, numbers, numbers, whole_numbers, numbers, i8, numbers
 
 
 @intrinsic
-def call(typingctx, address, t, y, p, k, u, c, out):  # type: ignore[no-untyped-def]
+def call(typingctx, address, t, y, p, k, u, c, out):
     """Call the right-hand side at `address`: rates `out` at time t and state y."""
     signature = types.void(address, t, y, p, k, u, c, out)
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, arguments):
         double, integer = ir.DoubleType(), ir.IntType(64)
         pointer, integers = double.as_pointer(), integer.as_pointer()
         kind = ir.FunctionType(ir.VoidType(), [double, pointer, pointer, integers, pointer, integer, pointer, pointer])

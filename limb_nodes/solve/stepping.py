@@ -43,7 +43,8 @@ class MuscleStepper:
 
     def drive(self, excitation: FloatArray) -> FloatArray:
         """What excitations [muscles] do to muscles and motor units [drives]."""
-        return self.model.drives(excitation[np.newaxis, :])[0]
+        found: FloatArray = self.model.drives(excitation[np.newaxis, :])[0]
+        return found
 
     def torque(
         self,

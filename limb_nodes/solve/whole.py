@@ -113,7 +113,7 @@ class WholeModel:
         """
         count = len(excitation)
         period = 1.0 / rate
-        times = np.arange(count) * period
+        times: FloatArray = np.arange(count, dtype=np.float64) * period
         u = self.drives(excitation)
         y = self.initial_state()
         out = np.empty((count, y.size))
@@ -208,4 +208,5 @@ def kinks(u: FloatArray, period: float) -> FloatArray:
         return np.empty(0)
     bend = np.abs(np.diff(u, n=2, axis=0))
     sharp = (bend > 1e-3).any(axis=1)
-    return (np.flatnonzero(sharp) + 1) * period
+    found: FloatArray = (np.flatnonzero(sharp) + 1).astype(np.float64) * period
+    return found
