@@ -11,6 +11,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 ScalarFunction = Callable[..., float]
 
@@ -28,7 +29,7 @@ class Equation:
     defines: str
     function: ScalarFunction
 
-    @property
+    @cached_property
     def uses(self) -> tuple[str, ...]:
         """Names of the quantities on the right-hand side, in the order of the arguments."""
         return tuple(inspect.signature(self.function).parameters)

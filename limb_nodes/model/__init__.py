@@ -3,6 +3,7 @@
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
 from limb_nodes.model.load import load_limb, parse_limb, with_values
+from limb_nodes.model.user_sources import user_sources
 
 __all__ = [
     "ChosenLaw",
@@ -12,5 +13,6 @@ __all__ = [
     "Segment",
     "load_limb",
     "parse_limb",
+    "user_sources",
     "with_values",
 ]

@@ -6,6 +6,7 @@ import copy
 import math
 import re
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from limb_nodes.errors import UserError
 from limb_nodes.levels import Parameter, motor_unit, sarcomere
 from limb_nodes.levels.motor_unit.recruitment import unit_thresholds
 from limb_nodes.model.check import check_geometry, check_unit
+from limb_nodes.model.check_law import check_laws
 from limb_nodes.model.choice import choose_law, read_law
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
@@ -98,7 +100,7 @@ def with_values(limb: Limb, values: Mapping[str, Any]) -> Limb:
             int(index) if index else name for name, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", place)
         ]
         target: Any = content
-        for step, following in zip(steps[:-1], steps[1:], strict=True):
+        for step, following in pairwise(steps):
             try:
                 if isinstance(target, dict) and target.get(step) is None:
                     target[step] = [] if isinstance(following, int) else {}
@@ -138,6 +140,7 @@ def build_limb(content: Any, file: str, text: str) -> Limb:
         content=content,
     )
     top.finish()
+    check_laws(limb)
     for muscle in muscles:
         check_geometry(file, muscle, segments[muscle.joint])
     return limb

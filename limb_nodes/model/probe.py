@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from limb_nodes.levels import Equation, sarcomere
-from limb_nodes.model.choice import ChosenLaw
+from limb_nodes.levels import CONTRACTS, Equation, sarcomere
+from limb_nodes.model.chosen import ChosenLaw
+from limb_nodes.model.curve_checks import number
 
 
 class BrokenLaw(Exception):
@@ -95,3 +96,37 @@ def missing(waiting: list[Step], known: set[str]) -> str:
             if symbol not in known and symbol not in defined:
                 return f"equation {step.equation.number} uses {symbol}, which is neither given nor defined"
     return f"the equations of {', '.join(sorted(defined))} use each other"
+
+
+def given(chosen: ChosenLaw) -> list[str]:
+    """The variables that a law of its process is given, and its states."""
+    return [*CONTRACTS[chosen.law.process].given, *(state.name for state in chosen.law.states)]
+
+
+def initial_states(chosen: ChosenLaw, probe: Probe) -> dict[str, float]:
+    """The law's states at the start."""
+    return {
+        state.name: chosen.values[state.initial] if state.initial in chosen.values else probe.start[state.initial]
+        for state in chosen.law.states
+    }
+
+
+def states_fault(chosen: ChosenLaw, probe: Probe, points: Iterable[tuple[dict[str, float], str]]) -> str:
+    """Whether the rates of a law's states are finite at points, each with its words for a message.
+
+    Each state is tried at its start and at both ends of its declared range.
+    """
+    law = chosen.law
+    start = initial_states(chosen, probe)
+    tried = [start]
+    for state in law.states:
+        low, high = law.ranges.get(state.name, (0.5 * start[state.name], 1.5 * start[state.name]))
+        tried += [{**start, state.name: low}, {**start, state.name: high}]
+    for point, words in points:
+        for states in tried:
+            found = probe.at(**{**states, **point})
+            for state in law.states:
+                if not math.isfinite(found[state.rate]):
+                    at = ", ".join(f"{name} {value:.4g}" for name, value in states.items())
+                    return f"{state.rate} is {number(found[state.rate])} at {at}{words}; it must be finite"
+    return ""

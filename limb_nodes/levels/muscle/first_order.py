@@ -55,6 +55,7 @@ first_order = register(
             ),
         ),
         states=(State("activation", "activation_rate", "Thelen 1", "initial_activation", 1.0),),
+        ranges={"activation": (0.0, 1.0)},
         source="Thelen, J Biomech Eng 125 (2003) 70",
     )
 )

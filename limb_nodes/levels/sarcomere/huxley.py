@@ -291,6 +291,7 @@ huxley = register(
             State("bond_moment_1", "bond_moment_1_rate", "dQ_1/dt", "initial_moment_1", 0.5),
             State("bond_moment_2", "bond_moment_2_rate", "dQ_2/dt", "initial_moment_2", 0.5),
         ),
+        ranges={"bond_moment_0": (0.0, 1.0), "bond_moment_1": (-1.0, 2.0), "bond_moment_2": (0.0, 4.0)},
         source="Zahalak, Math Biosci 55 (1981) 89, after Huxley, Prog Biophys 7 (1957) 255",
     )
 )

@@ -1,0 +1,112 @@
+"""Checks of the laws of muscles: path, tendon, aponeurosis, activation dynamics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from limb_nodes.model.chosen import ChosenLaw
+from limb_nodes.model.curve_checks import curve_fault, grid, place
+from limb_nodes.model.probe import Probe, given, initial_states, states_fault
+
+FORCES = [0.0, 1.0, 10.0, 100.0, 1000.0]
+
+
+def path_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
+    """Length positive, velocity its rate, moment arm finite over the joint's range."""
+    variable = "joint_angle"
+    probe = Probe(chosen, given(chosen), {"role": context["role"]})
+    low, high = chosen.law.ranges.get(variable, (context["lowest_angle"], context["highest_angle"]))
+    # Without the ends: stretched out, a path may lie in its joint's axis.
+    angles = grid(low, high, 20)[1:-1]
+    points = [probe.at(joint_angle=angle, joint_velocity=1.0) for angle in angles]
+    for name in ("muscle_tendon_length", "muscle_tendon_velocity", "moment_arm"):
+        least = 0.0 if name == "muscle_tendon_length" else -math.inf
+        fault = curve_fault(name, variable, angles, [point[name] for point in points], least=least)
+        if fault:
+            return fault
+    small = 1e-5 * (high - low)
+    for angle, point in zip(angles, points, strict=True):
+        before, after = (
+            probe.at(joint_angle=angle + step, joint_velocity=1.0)["muscle_tendon_length"] for step in (-small, small)
+        )
+        shortening = (before - after) / (2.0 * small)
+        velocity = point["muscle_tendon_velocity"]
+        if abs(shortening - velocity) > 1e-5 * (abs(shortening) + abs(velocity)) + 1e-9:
+            return (
+                f"muscle_tendon_velocity is {velocity:.6g} m/s at {place(variable, angle)} and 1 rad/s, "
+                f"but the length shortens by {shortening:.6g} m/s"
+            )
+    return ""
+
+
+def tendon_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
+    """A tendon with a state lengthens the faster, the more it is pulled and the shorter it is."""
+    name, variable = "tendon_velocity", "tendon_length"
+    probe = Probe(chosen, given(chosen), {})
+    slack = chosen.values.get("slack_length", 0.0) or 0.1
+    states = initial_states(chosen, probe)
+    pulls = sorted(-force for force in FORCES)
+    if variable not in states:
+        points = [probe.at(**states, tendon_force=pull, tendon_length=slack) for pull in pulls]
+        return curve_fault(name, "tendon_force", pulls, [point[name] for point in points])
+    low, high = chosen.law.ranges.get(variable, (0.9 * slack, 1.2 * slack))
+    lengths = grid(low, high, 40)
+    for pull in pulls[::2]:
+        velocities = [probe.at(**{**states, "tendon_force": pull, variable: length})[name] for length in lengths]
+        words = f" and {place('tendon_force', pull)}"
+        fault = curve_fault(name, variable, lengths, velocities, direction=-1, suffix=words)
+        if fault:
+            return fault
+    for length in lengths[::20]:
+        velocities = [probe.at(**{**states, "tendon_force": pull, variable: length})[name] for pull in pulls]
+        words = f" and {place(variable, length)}"
+        fault = curve_fault(name, "tendon_force", pulls, velocities, direction=-1, suffix=words)
+        if fault:
+            return fault
+    return ""
+
+
+def aponeurosis_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
+    """Muscle force and fibre velocity rise with the force of the fibres, so that the loop closes once."""
+    variable = "total_fibre_force"
+    probe = Probe(chosen, given(chosen), {"muscle_velocity": 0.0})
+    states = initial_states(chosen, probe)
+    optimal = context["optimal_length"]
+    lengths = grid(0.5 * optimal, 1.5 * optimal, 4)
+    if states:
+        # Only some lengths go with a state; where they do not, `check_geometry` says so.
+        lengths = [max(optimal, 2.0 * max(states.values()))]
+    for length in lengths:
+        points = [probe.at(**states, muscle_length=length, total_fibre_force=force) for force in FORCES]
+        words = f" and {place('muscle_length', length)}"
+        for name, direction, least in (
+            ("muscle_force", 1, 0.0),
+            ("fibre_velocity", 1, -math.inf),
+            ("fibre_length", 0, 0.0),
+            ("pennation_angle", 0, -math.inf),
+        ):
+            values = [point[name] for point in points]
+            fault = curve_fault(name, variable, FORCES, values, direction=direction, least=least, suffix=words)
+            if fault:
+                return fault
+    return ""
+
+
+def activation_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
+    """Finite; without states it rises with the excitation and is not negative."""
+    probe = Probe(chosen, given(chosen), {})
+    excitations = grid(0.0, 1.0, 20)
+    if not chosen.law.states:
+        activations = [probe.at(excitation=excitation)["activation"] for excitation in excitations]
+        return curve_fault("activation", "excitation", excitations, activations, direction=1, least=0.0)
+    points = (({"excitation": excitation}, f" and {place('excitation', excitation)}") for excitation in excitations)
+    return states_fault(chosen, probe, points)
+
+
+MUSCLE_CHECKS: dict[str, Callable[[ChosenLaw, dict[str, float]], str]] = {
+    "path": path_fault,
+    "tendon": tendon_fault,
+    "aponeurosis": aponeurosis_fault,
+    "activation_dynamics": activation_fault,
+}
