@@ -1,6 +1,7 @@
 """Level of the motor unit: fibre quantities, characteristics, recruitment, force."""
 
 import math
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
@@ -101,7 +102,7 @@ def test_thresholds_follow_the_areas():
 def test_the_last_unit_joins_at_the_muscles_threshold(areas, threshold):
     found = unit_thresholds(areas, threshold)
     assert found[-1] == pytest.approx(threshold)
-    assert all(a <= b for a, b in zip(found, found[1:], strict=False))
+    assert all(a <= b for a, b in pairwise(found))
 
 
 @given(st.floats(0.0, 0.99), st.floats(0.0, 1.0))

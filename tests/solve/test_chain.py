@@ -1,0 +1,211 @@
+"""The compiled chain against MuJoCo, its energy, and impacts on joint limits."""
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from limb_nodes.model import parse_limb
+from limb_nodes.model.layout import build_layout
+from limb_nodes.solve import chain
+from limb_nodes.solve.whole import WholeModel
+
+GRAVITY = (1.5, -9.81)
+TIP = (7.0, -12.0, 0.4)
+BASE_ANGLE = -1.2
+
+
+def yaml_of(n: int, seed: int = 0, limited: tuple[int, ...] = (), tip=(0.0, 0.0, 0.0)) -> str:
+    """A chain; `limited` joints have a range around their first angle."""
+    rng = np.random.default_rng(seed)
+    lines = [
+        f"name: chain{n}",
+        f"gravity: [{GRAVITY[0]}, {GRAVITY[1]}]",
+        f"base_angle: {BASE_ANGLE}",
+        f"tip_force: [{tip[0]}, {tip[1]}]",
+        f"tip_torque: {tip[2]}",
+        "segments:",
+    ]
+    for k in range(n):
+        length = rng.uniform(0.15, 0.5)
+        numbers = {
+            "mass": rng.uniform(0.3, 4.0),
+            "length": length,
+            "com_distance": length * rng.uniform(0.2, 0.9),
+            "inertia": rng.uniform(0.005, 0.1),
+            "angle": rng.uniform(-1, 1),
+            "velocity": rng.uniform(-3, 3),
+        }
+        if k in limited:
+            numbers["range"] = [numbers["angle"] - 0.25, numbers["angle"] + 0.4]
+        lines.append(f"  - {{name: s{k}, " + ", ".join(f"{key}: {value}" for key, value in numbers.items()) + "}")
+    return "\n".join(lines)
+
+
+def limb_of(n: int, **options):
+    return parse_limb(yaml_of(n, **options), "chain.yaml")
+
+
+class Mujoco:
+    """The same chain there: hinges about z, bodies whose x axis runs along the segment."""
+
+    def __init__(self, limb, step: float = 1e-4) -> None:
+        body = ""
+        for k, s in enumerate(limb.segments):
+            place = f"{limb.segments[k - 1].length} 0 0" if k else "0 0 0"
+            turned = 0.0 if k else limb.base_angle
+            body += (
+                f'<body name="b{k}" pos="{place}" euler="0 0 {turned}"><joint type="hinge" axis="0 0 1"/>'
+                f'<inertial pos="{s.com_distance} 0 0" mass="{s.mass}" diaginertia="{" ".join(3 * [str(s.inertia)])}"/>'
+            )
+        last = limb.segments[-1]
+        body += f'<site name="tip" pos="{last.length} 0 0"/>' + "</body>" * len(limb.segments)
+        self.model = mujoco.MjModel.from_xml_string(
+            f'<mujoco><compiler angle="radian" autolimits="true"/>'
+            f'<option timestep="{step}" gravity="{limb.gravity[0]} {limb.gravity[1]} 0" integrator="RK4"/>'
+            f"<worldbody>{body}</worldbody></mujoco>"
+        )
+        self.data = mujoco.MjData(self.model)
+        self.limb = limb
+        self.set([s.angle for s in limb.segments], [s.velocity for s in limb.segments])
+
+    def set(self, angle, velocity) -> None:
+        self.data.qpos[:], self.data.qvel[:] = angle, velocity
+        mujoco.mj_forward(self.model, self.data)
+
+    def acceleration(self, torque) -> np.ndarray:
+        force = np.zeros(self.model.nv)
+        body = self.model.nbody - 1
+        mujoco.mj_applyFT(
+            self.model,
+            self.data,
+            np.array([*self.limb.tip_force, 0.0]),
+            np.array([0.0, 0.0, self.limb.tip_torque]),
+            self.data.site("tip").xpos.copy(),
+            body,
+            force,
+        )
+        self.data.qfrc_applied[:] = force + torque
+        mujoco.mj_forward(self.model, self.data)
+        return self.data.qacc.copy()
+
+    def matrix(self) -> np.ndarray:
+        full = np.zeros((self.model.nv, self.model.nv))
+        try:
+            mujoco.mj_fullM(self.model, self.data, full)
+        except TypeError:
+            mujoco.mj_fullM(self.model, full, self.data.qM)
+        return full
+
+
+def scratch(n: int) -> np.ndarray:
+    return np.zeros(n * n + 7 * n)
+
+
+def joint_matrix(limb, angle: np.ndarray) -> np.ndarray:
+    n, w = len(angle), scratch(len(angle))
+    chain.joint_equations(n, build_layout(limb).parameters, angle, np.zeros(n), 0.0, 0.0, 0.0, w)
+    return w[: n * n].reshape(n, n).copy()
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
+def test_accelerations_are_those_of_mujoco(n):
+    rng = np.random.default_rng(n)
+    limb = limb_of(n, seed=n, tip=TIP)
+    other = Mujoco(limb)
+    numbers = build_layout(limb).parameters
+    for _ in range(20):
+        angle, velocity, torque = rng.uniform(-3, 3, n), rng.uniform(-8, 8, n), rng.uniform(-20, 20, n)
+        found = np.empty(n)
+        chain.acceleration(n, numbers, angle, velocity, torque, *TIP, np.zeros(n), found, scratch(n))
+        other.set(angle, velocity)
+        np.testing.assert_allclose(found, other.acceleration(torque), rtol=1e-8, atol=1e-7)
+        np.testing.assert_allclose(joint_matrix(limb, angle), other.matrix(), rtol=1e-9, atol=1e-12)
+
+
+@pytest.fixture(scope="session")
+def five():
+    """The structure of a chain of five segments without muscles, compiled once."""
+    return WholeModel(limb_of(5, seed=3))
+
+
+def simulate(limb, duration: float, rate: float = 1000.0, **options):
+    return WholeModel(limb).simulate(np.zeros((round(duration * rate) + 1, 0)), rate, **options)
+
+
+def energy(limb, angle: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """Kinetic and potential energy [T], from positions and velocities of the centres of mass."""
+    turned, speed = limb.base_angle + np.cumsum(angle, axis=1), np.cumsum(velocity, axis=1)
+    total = np.zeros(len(angle))
+    origin, moving = np.zeros((len(angle), 2)), np.zeros((len(angle), 2))
+    for k, s in enumerate(limb.segments):
+        along = np.column_stack([np.cos(turned[:, k]), np.sin(turned[:, k])])
+        across = np.column_stack([-along[:, 1], along[:, 0]]) * speed[:, k : k + 1]
+        place, fast = origin + s.com_distance * along, moving + s.com_distance * across
+        total += 0.5 * s.mass * (fast**2).sum(axis=1) + 0.5 * s.inertia * speed[:, k] ** 2
+        total -= s.mass * place @ np.array(limb.gravity)
+        origin, moving = origin + s.length * along, moving + s.length * across
+    return total
+
+
+def test_energy_of_five_free_segments_is_conserved(five):
+    found = five.simulate(np.zeros((5001, 0)), 1000.0)
+    total = energy(five.limb, found.angle, found.velocity)
+    exchanged = np.ptp(total - energy(five.limb, found.angle, 0 * found.velocity))
+    assert exchanged > 10.0
+    assert np.abs(total - total[0]).max() < 1e-6 * exchanged
+
+
+def test_trajectory_of_five_segments_is_that_of_mujoco(five):
+    other, limb = Mujoco(five.limb, step=5e-5), five.limb
+    found = simulate(limb, 0.5, 100.0)
+    for row in range(1, 51):
+        for _ in range(200):
+            mujoco.mj_step(other.model, other.data)
+        np.testing.assert_allclose(found.angle[row], other.data.qpos, atol=1e-6)
+        np.testing.assert_allclose(found.velocity[row], other.data.qvel, atol=1e-5)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.integers(1, 5), st.integers(0, 10**6), st.data())
+def test_an_impact_keeps_the_momenta_of_free_joints(n, seed, data):
+    """Stopped joints take up impulses; the generalised momenta of the others cannot change."""
+    limb = limb_of(n, seed=seed)
+    rng = np.random.default_rng(seed)
+    angle, velocity = rng.uniform(-3, 3, n), rng.uniform(-8, 8, n)
+    locked = np.array(data.draw(st.lists(st.sampled_from([-1.0, 0.0, 1.0]), min_size=n, max_size=n)))
+    other = Mujoco(limb)
+    other.set(angle, velocity)
+    matrix = other.matrix()
+    after = velocity.copy()
+    chain.impact(n, build_layout(limb).parameters, angle, after, locked, scratch(n))
+    free = locked == 0.0
+    np.testing.assert_array_equal(after[~free], 0.0)
+    np.testing.assert_allclose((matrix @ after)[free], (matrix @ velocity)[free], rtol=1e-9, atol=1e-10)
+    # No impulse adds energy.
+    assert after @ matrix @ after <= velocity @ matrix @ velocity * (1 + 1e-12)
+
+
+@pytest.mark.usefixtures("five")
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_joints_stay_within_their_ranges(seed):
+    limb = limb_of(5, seed=seed, limited=(0, 2, 3))
+    found = simulate(limb, 3.0)
+    touched = 0
+    for joint in 0, 2, 3:
+        lowest, highest = limb.segments[joint].joint_range
+        angle, velocity = found.angle[:, joint], found.velocity[:, joint]
+        assert angle.min() >= lowest - 1e-9
+        assert angle.max() <= highest + 1e-9
+        resting = (angle == lowest) | (angle == highest)
+        touched += resting.sum()
+        assert np.all(velocity[resting] == 0.0)
+        # Between two instants a joint moves no farther than its speed allows, give or take one acceleration: nothing jumps.
+        reach = np.maximum(np.abs(velocity[:-1]), np.abs(velocity[1:])) * 1e-3
+        assert (np.abs(np.diff(angle)) <= reach + 0.2e-3).all()
+    assert touched > 100
+    # Impacts take energy, nothing gives any.
+    total = energy(limb, found.angle, found.velocity)
+    assert np.diff(total).max() < 1e-5
+    assert total[-1] < total[0] - 0.1
