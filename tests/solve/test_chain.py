@@ -201,7 +201,7 @@ def test_joints_stay_within_their_ranges(seed):
         resting = (angle == lowest) | (angle == highest)
         touched += resting.sum()
         assert np.all(velocity[resting] == 0.0)
-        # Between two instants a joint moves no farther than its speed allows, give or take one acceleration: nothing jumps.
+        # Nothing jumps: between two instants a joint moves no farther than its speed and acceleration allow.
         reach = np.maximum(np.abs(velocity[:-1]), np.abs(velocity[1:])) * 1e-3
         assert (np.abs(np.diff(angle)) <= reach + 0.2e-3).all()
     assert touched > 100
