@@ -9,6 +9,7 @@ come from one place.
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -53,6 +54,11 @@ def equation_of(function: ScalarFunction) -> Equation:
     return found
 
 
+def is_finite(value: float) -> bool:
+    """Whether a number, an integer of any length included, is one of the finite floats."""
+    return abs(value) <= sys.float_info.max
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A number that the user gives: name, unit, meaning, allowed range, default and its source.
@@ -92,7 +98,7 @@ class Parameter:
     def accepts(self, value: float) -> bool:
         """Whether `value` is finite and within the bounds."""
         return (
-            abs(value) < float("inf")
+            is_finite(value)
             and (self.minimum is None or value >= self.minimum)
             and (self.maximum is None or value <= self.maximum)
             and (self.above is None or value > self.above)

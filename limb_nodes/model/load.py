@@ -94,7 +94,7 @@ def with_values(limb: Limb, values: Mapping[str, Any]) -> Limb:
 
     A place that is not in the limb's file is added; all checks run again. Raises UserError.
     """
-    content = copy.deepcopy(limb.content)
+    content = unshared(limb.content)
     for place, value in values.items():
         steps: list[str | int] = [
             int(index) if index else name for name, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", place)
@@ -112,6 +112,15 @@ def with_values(limb: Limb, values: Mapping[str, Any]) -> Limb:
         except (IndexError, TypeError):
             raise UserError(f"{limb.file}: {place} is not a place of this limb") from None
     return build_limb(content, limb.file, limb.text)
+
+
+def unshared(content: Any) -> Any:
+    """A deep copy in which what YAML aliases share is there as often as it is used."""
+    if isinstance(content, dict):
+        return {key: unshared(value) for key, value in content.items()}
+    if isinstance(content, list):
+        return [unshared(value) for value in content]
+    return copy.deepcopy(content)
 
 
 def build_limb(content: Any, file: str, text: str) -> Limb:
@@ -140,9 +149,9 @@ def build_limb(content: Any, file: str, text: str) -> Limb:
         content=content,
     )
     top.finish()
-    check_laws(limb)
     for muscle in muscles:
         check_geometry(file, muscle, segments[muscle.joint])
+    check_laws(limb)
     return limb
 
 
@@ -182,10 +191,14 @@ def read_muscle(
     recruitment = choose_law(section, "recruitment", "recruitment")
     units: list[tuple[float, MotorUnit]] = []
     for position, unit_section in enumerate(section.sections("units", required=True)):
-        units += read_units(unit_section, position, sarcomeres, kinds, recruitment)
+        names = {unit.name for _, unit in units}
+        found = read_units(unit_section, position, sarcomeres, kinds, recruitment)
+        for _, unit in found:
+            if unit.name in names:
+                section.fail(f"units[{position}].name", f"is {unit.name!r} a second time; names are unique")
+        units += found
     units.sort(key=lambda entry: entry[0])
     ordered = [unit for _, unit in units]
-    refuse_twins(section, "units", "name", [unit.name for unit in ordered])
     section.finish()
     thresholds = unit_thresholds([unit.values["pcsa"] for unit in ordered], threshold)
     for rank, (unit, unit_threshold) in enumerate(zip(ordered, thresholds, strict=True)):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from limb_nodes.errors import UserError
 from limb_nodes.levels import Parameter
+from limb_nodes.levels.equation import is_finite
 
 
 def read_yaml(path: Path) -> tuple[Any, str]:
@@ -33,7 +33,8 @@ def parse_yaml(text: str, file: str) -> Any:
         mark = problem.problem_mark
         line = f", line {mark.line + 1}" if mark else ""
         raise UserError(f"{file}{line}: not YAML: {one_line(problem.problem)}") from None
-    except YAMLError as problem:
+    except (YAMLError, ValueError) as problem:
+        # ValueError: a date or a tagged number that is none.
         raise UserError(f"{file}: not YAML: {one_line(problem)}") from None
 
 
@@ -114,7 +115,7 @@ class Section:
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.fail(key, f"is {describe(value)}; {parameter.allowed()} is needed")
         if not parameter.accepts(value):
-            self.fail(key, f"is {value}; {parameter.allowed()} is needed")
+            self.fail(key, f"is {describe(value)}; {parameter.allowed()} is needed")
         return float(value)
 
     def vector(self, key: str, length: int, default: tuple[float, ...] | None) -> tuple[float, ...]:
@@ -125,9 +126,7 @@ class Section:
         good = (
             isinstance(value, list)
             and len(value) == length
-            and all(
-                isinstance(item, int | float) and not isinstance(item, bool) and math.isfinite(item) for item in value
-            )
+            and all(isinstance(item, int | float) and not isinstance(item, bool) and is_finite(item) for item in value)
         )
         if not good:
             found = "is missing" if value is None else f"is {describe(value)}"
