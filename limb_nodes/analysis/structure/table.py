@@ -21,6 +21,9 @@ KINDS = {
 }
 MEMBERS = 12
 PRIME = "'"
+# Blanks at which no line is broken.
+TIED = "\N{NO-BREAK SPACE}"
+ARROW = f"{TIED}→{TIED}"
 LEGEND = (
     "⊗ the equation defines the variable, × it uses it, (×) another law of this process may use it; "
     "(variable) is given from outside. dof: degrees of freedom, unknowns less equations. index: structural "
@@ -33,15 +36,15 @@ def report(findings: Sequence[Findings], limb_name: str, width: int, every_matri
 
     every_matrix: print those of the assembled muscle and the whole model too, which hold those of the other levels.
     """
-    parts = [f"structure of {limb_name}", "", summary(findings)]
+    parts = [f"structure of {limb_name}", "", *summary(findings, width)]
     parts += ["", *wrapped(LEGEND, width, "")]
     for one in findings:
         parts += ["", *level_lines(one, width, every_matrix)]
     return "\n".join(parts)
 
 
-def summary(findings: Iterable[Findings]) -> str:
-    """One line for each level."""
+def summary(findings: Iterable[Findings], width: int) -> list[str]:
+    """One line for each level; laws for which a line has no room stand below."""
     rows = [("level", "equations", "unknowns", "dof", "index", "block", "kind", "laws")]
     for one in findings:
         system = one.system
@@ -60,7 +63,12 @@ def summary(findings: Iterable[Findings]) -> str:
                 ", ".join(laws),
             )
         )
-    return "\n".join(columns(rows, right=(1, 2, 3, 4, 5)))
+    start = len(columns([(*row[:-1], "|") for row in rows], right=(1, 2, 3, 4, 5))[0]) - 1
+    lines: list[str] = []
+    for line in columns(rows, right=(1, 2, 3, 4, 5)):
+        first, *more = wrapped(line[start:], max(24, width - start), "")
+        lines += [line[:start] + first, *(" " * start + text for text in more)]
+    return [line.rstrip() for line in lines]
 
 
 def columns(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> list[str]:
@@ -160,7 +168,7 @@ def block_text(one: Findings, block: Block) -> str:
     """The equations of a block, each with the unknown that it gives; primes mark derivatives."""
     times = one.differentiated
     pairs = [
-        f"{one.system.relations[i].label}{PRIME * times.get(i, 0)} → {symbol(variable.name)}{PRIME * order}"
+        f"{one.system.relations[i].label}{PRIME * times.get(i, 0)}{ARROW}{symbol(variable.name)}{PRIME * order}"
         for i, (variable, order) in zip(block.relations, block.unknowns, strict=True)
     ]
     return counted(pairs)
@@ -178,16 +186,18 @@ def variable_names(variables: Iterable[Variable]) -> str:
 
 def counted(texts: Sequence[str]) -> str:
     """Texts, each once, with how often it occurs where that is more than once."""
-    return ", ".join(f"{text} [{count}]" if count > 1 else text for text, count in Counter(texts).items())
+    return ", ".join(f"{text}{TIED}[{count}]" if count > 1 else text for text, count in Counter(texts).items())
 
 
 def matrix_lines(matrix: Matrix, width: int) -> list[str]:
     """The matrix; where it is wider than `width`, several tables, without the rows that are empty there."""
-    head = max(len(row) for row in matrix.rows) + 2
+    head = max(len(row_heading(row)) for row in matrix.rows)
+    marks = {key: MARKS[mark] for key, mark in matrix.entries.items()}
     tables: list[list[str]] = [[]]
     used = head
     for column in matrix.columns:
-        cell = len(matrix.heading(column)) + 2
+        cells = [mark for (_, other), mark in marks.items() if other == column]
+        cell = 2 + max(map(len, [matrix.heading(column), *cells]))
         if used + cell > width and tables[-1]:
             tables.append([])
             used = head
@@ -199,8 +209,7 @@ def matrix_lines(matrix: Matrix, width: int) -> list[str]:
         for row in matrix.rows:
             if len(tables) > 1 and not any((row, c) in matrix.entries for c in table):
                 continue
-            marks = [MARKS[matrix.entries[row, c]] if (row, c) in matrix.entries else "·" for c in table]
-            rows.append([f"({row})" if row[0].isdigit() else row, *marks])
+            rows.append([row_heading(row), *(marks.get((row, c), "·") for c in table)])
         widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
         lines += [""] if number else []
         lines += [
@@ -218,6 +227,11 @@ def plural(count: int, word: str) -> str:
     return f"{count} {word}{'s' if count != 1 else ''}"
 
 
+def row_heading(row: str) -> str:
+    """The label of an equation, in parentheses if it is a number."""
+    return f"({row})" if row[0].isdigit() else row
+
+
 def wrapped(text: str, width: int, indent: str = "  ") -> list[str]:
     """Lines of a text, the later ones indented."""
     lines: list[str] = []
@@ -228,4 +242,4 @@ def wrapped(text: str, width: int, indent: str = "  ") -> list[str]:
             line = indent + word
         else:
             line = f"{line} {word}" if line else word
-    return [*lines, line]
+    return [text.replace(TIED, " ") for text in (*lines, line)]
