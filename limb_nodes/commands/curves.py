@@ -1,0 +1,45 @@
+"""`limb curves`: every characteristic of a limb's laws as a picture."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from limb_nodes.analysis.curves import characteristics
+from limb_nodes.errors import UserError
+from limb_nodes.model import load_limb
+
+PICTURES = (".png", ".pdf", ".svg")
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the arguments of `limb curves`."""
+    parser = subparsers.add_parser(
+        "curves",
+        help="draw every characteristic of a limb's laws",
+        description="Draw the characteristics of a limb's laws with their units: force by velocity, length and "
+        "frequency, passive force, recruitment, activation, tendons, paths, moment arms and pennation.",
+    )
+    parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
+    parser.add_argument("-o", "--out", required=True, metavar="FILE.png", help=f"the picture; {', '.join(PICTURES)}")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw, and say what was drawn."""
+    out = Path(args.out)
+    if out.suffix.lower() not in PICTURES:
+        raise UserError(f"--out {args.out}: the name of a picture ends in {', '.join(PICTURES)}")
+    limb = load_limb(args.limb)
+    if not limb.muscles:
+        raise UserError(f"{args.limb}: muscles is empty; a limb without muscles has no characteristics")
+    panels = characteristics(limb)
+    from limb_nodes.analysis.draw_curves import draw
+
+    try:
+        draw(panels, limb.name, out)
+    except OSError as problem:
+        raise UserError(f"--out {args.out}: cannot be written: {problem.strerror or problem}") from None
+    for panel in panels:
+        print(f"{panel.title}: {', '.join(panel.laws)}")
+    print(f"picture: {out}")
+    return 0
