@@ -53,7 +53,7 @@ def draw_panel(axes: Axes, panel: Panel, colours: Mapping[str, str]) -> None:
     y_factor, y_unit = shown(panel.y_unit, [curve.y for curve in panel.curves])
     keys = list(dict.fromkeys(curve.key for curve in panel.curves))
     # Of many curves some lie upon each other: the lower ones are wider, so that all can be seen.
-    spread = 1.1 if len(panel.curves) > MANY else 0.0
+    spread = 0.5 if len(panel.curves) > MANY else 0.0
     width = {key: 1.8 + spread * (len(keys) - 1 - index) for index, key in enumerate(keys)}
     for curve in panel.curves:
         axes.plot(
@@ -71,7 +71,9 @@ def draw_panel(axes: Axes, panel: Panel, colours: Mapping[str, str]) -> None:
     axes.text(0.0, 1.025, below, transform=axes.transAxes, fontsize=8, color=GREY)
     decorate(axes, panel, x_factor)
     count = sum(1 for curve in panel.curves if curve.label)
-    axes.legend(fontsize=8 if count <= MANY else 6.5, frameon=False, ncols=2 if count > 5 else 1)
+    legend = axes.legend(fontsize=8 if count <= MANY else 6.5, frameon=False, ncols=2 if count > 5 else 1)
+    for line in legend.get_lines():
+        line.set_linewidth(1.8)
 
 
 def decorate(axes: Axes, panel: Panel, x_factor: float) -> None:

@@ -13,6 +13,7 @@ from limb_nodes.levels.sarcomere.lengths import (
 )
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Muscle, Segment
+from limb_nodes.model.probe import Probe, given
 from limb_nodes.model.section import Section
 
 ANGLES = 181
@@ -65,6 +66,7 @@ def check_geometry(file: str, muscle: Muscle, segment: Segment) -> None:
     if muscle.laws["aponeurosis"].law.states:
         check_triangle(file, muscle, longest)
         return
+    shortest, longest = (fibre_length(muscle, max(0.0, length)) for length in (shortest, longest))
     for index, unit in enumerate(muscle.units):
         sarcomere = unit.laws["sarcomere"].values
         series = unit.values["series_sarcomeres"]
@@ -77,6 +79,13 @@ def check_geometry(file: str, muscle: Muscle, segment: Segment) -> None:
                 f"of {least:.4g} to {most:.4g} m (optimal {optimal:.4g}) never meet the lengths "
                 f"{shortest:.4g} to {longest:.4g} m that the joint allows"
             )
+
+
+def fibre_length(muscle: Muscle, muscle_length: float) -> float:
+    """Fibre length (m) at a muscle length, for an aponeurosis without states."""
+    chosen = muscle.laws["aponeurosis"]
+    found = Probe(chosen, given(chosen), {}).at(muscle_length=muscle_length, muscle_velocity=0.0, total_fibre_force=0.0)
+    return found["fibre_length"]
 
 
 def check_triangle(file: str, muscle: Muscle, longest: float) -> None:
