@@ -14,6 +14,10 @@ from limb_nodes.analysis.structure.table import report
 from limb_nodes.errors import UserError
 from limb_nodes.model import load_limb
 
+# For terminals without these characters.
+PLAIN = str.maketrans({
+    "⊗": "O", "×": "x", "·": ".", "→": ">", "α": "alpha", "β": "beta", "θ": "theta", "ω": "omega",
+})  # fmt: skip
 PICTURES = (".png", ".pdf", ".svg")
 
 
@@ -54,6 +58,15 @@ def run(args: argparse.Namespace) -> int:
         text = report(findings, limb.name, max(60, shutil.get_terminal_size((110, 24)).columns), bool(args.level))
         if out:
             text += f"\n\npicture: {out}"
-    encoding = sys.stdout.encoding or "utf-8"
-    print(text.encode(encoding, "replace").decode(encoding))
+    print(printable(text))
     return 0 if all(one.sound for one in findings if one.system.name != "limb_original") else 1
+
+
+def printable(text: str) -> str:
+    """The text, with plain letters where standard output cannot show its symbols."""
+    encoding = sys.stdout.encoding or "utf-8"
+    try:
+        text.encode(encoding)
+    except UnicodeEncodeError:
+        return text.translate(PLAIN).encode(encoding, "replace").decode(encoding)
+    return text

@@ -261,7 +261,7 @@ def test_a_law_that_leaves_a_variable_without_equation_is_named():
     assert muscle.parts.over == ((), ())
     text = report([muscle], "test", 100)
     assert "structurally singular" in text
-    assert "on no left-hand side: v_T" in text
+    assert "v_T (tendon_velocity) is defined by no equation" in text
     assert "under-determined" in text
 
 
@@ -284,7 +284,7 @@ def test_a_law_that_defines_a_variable_twice_is_named():
     assert {"2.30", "constant velocity"} <= set(labels(tendon, over))
     assert "tendon_velocity" in {v.name for v in unknowns}
     text = report([tendon], "test", 100)
-    assert "v_T is defined more than once: 2.30, constant velocity" in text
+    assert "v_T (tendon_velocity) is defined more than once: by 2.30, constant velocity" in text
     assert "over-determined" in text
 
 
@@ -496,7 +496,7 @@ def test_a_system_that_cannot_be_solved_ends_with_status_1(monkeypatch, capsys):
     broken = with_law(limb_of("reference_joint_tendon"), "tendon", SPRING, {})
     monkeypatch.setattr(structure, "load_limb", lambda path: broken)
     assert limb_structure("broken.yaml") == 1
-    assert "F_T is defined more than once: 2.53, spring" in capsys.readouterr().out
+    assert "F_T (tendon_force) is defined more than once: by 2.53, spring" in capsys.readouterr().out
 
 
 def test_a_limb_without_muscles_has_the_levels_of_the_limb():
@@ -505,3 +505,11 @@ def test_a_limb_without_muscles_has_the_levels_of_the_limb():
     assert [one.system.name for one in found] == ["limb_original", "limb_transformed", "model"]
     assert [one.index for one in found] == [3, 0, 1]
     assert [one.name for one in equation_sets(limb, "model")] == ["model"]
+
+
+def test_a_terminal_without_symbols_gets_letters(monkeypatch):
+    class Plain:
+        encoding = "ascii"
+
+    monkeypatch.setattr(structure.sys, "stdout", Plain())
+    assert structure.printable("⊗ × θ_penn → v_T") == "O x theta_penn > v_T"

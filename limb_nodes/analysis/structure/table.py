@@ -20,6 +20,7 @@ KINDS = {
     "ordinary differential equations": "ODE",
 }
 MEMBERS = 12
+LONGEST_LIST = 12
 PRIME = "'"
 # Blanks at which no line is broken.
 TIED = "\N{NO-BREAK SPACE}"
@@ -113,29 +114,27 @@ def level_lines(one: Findings, width: int, every_matrix: bool) -> list[str]:
 
 def blame_lines(one: Findings, width: int) -> list[str]:
     """The equations and variables to blame for a system that cannot be solved as it stands."""
-    lines: list[str] = []
-    (over_equations, over_unknowns), (under_equations, under_unknowns) = one.parts.over, one.parts.under
     relations = one.system.relations
-    if over_equations:
-        lines += wrapped(
-            f"over-determined: {len(over_equations)} equations for {len(over_unknowns)} unknowns: equations "
-            f"{equation_names([relations[i] for i in over_equations])}; unknowns {variable_names(over_unknowns)}",
-            width,
-        )
-    if under_unknowns:
-        lines += wrapped(
-            f"under-determined: {len(under_unknowns)} unknowns in {len(under_equations)} equations: unknowns "
-            f"{variable_names(under_unknowns)}; equations {equation_names([relations[i] for i in under_equations])}",
-            width,
-        )
-    for variable, several in one.defined_twice.items():
-        lines += wrapped(f"{variable_names([variable])} is defined more than once: {equation_names(several)}", width)
-    if one.undefined:
-        lines += wrapped(f"on no left-hand side: {variable_names(one.undefined)}", width)
+    texts = [
+        f"{spelled(variable)} is defined more than once: by {equation_names(several)}"
+        for variable, several in one.defined_twice.items()
+    ]
+    texts += [f"{spelled(variable)} is defined by no equation" for variable in one.undefined]
+    lines: list[str] = []
+    for text, count in Counter(texts).items():
+        lines += wrapped(f"{text} [{count}]" if count > 1 else text, width)
+    for word, (equations, unknowns) in (("over", one.parts.over), ("under", one.parts.under)):
+        if equations or unknowns:
+            lines += wrapped(
+                f"{word}-determined: {plural(len(equations), 'equation')} with {plural(len(unknowns), 'unknown')}: "
+                f"{shortened(equation_names([relations[i] for i in equations]) or 'none')} with "
+                f"{shortened(variable_names(unknowns) or 'none')}",
+                width,
+            )
     if one.differentiated:
         counts: dict[int, list[Relation]] = {}
-        for i, times in one.differentiated.items():
-            counts.setdefault(times, []).append(relations[i])
+        for place, times in one.differentiated.items():
+            counts.setdefault(times, []).append(relations[place])
         text = "; ".join(
             f"{equation_names(several)} {TIMES.get(times, f'{times} times')}"
             for times, several in sorted(counts.items(), reverse=True)
@@ -143,9 +142,9 @@ def blame_lines(one: Findings, width: int) -> list[str]:
         lines += wrapped(f"to be differentiated: {text}", width)
         assert one.offsets is not None
         shown: dict[str, None] = {}
-        for rows, unknowns in one.offsets.constraints:
+        for rows, nodes in one.offsets.constraints:
             labels = counted([relations[i].label + PRIME * times for i, times in rows])
-            held = counted([symbol(variable.name) + PRIME * order for variable, order in unknowns])
+            held = counted([symbol(variable.name) + PRIME * order for variable, order in nodes])
             verb = "holds" if len(rows) == 1 else "together hold"
             shown.setdefault(f"{labels} {verb} only {held}" if held else f"{labels} {verb} nothing but states")
         for text in shown:
@@ -182,6 +181,19 @@ def equation_names(relations: Iterable[Relation]) -> str:
 def variable_names(variables: Iterable[Variable]) -> str:
     """Symbols of variables, each once, with the number of variables that share it."""
     return counted([symbol(variable.name) for variable in variables])
+
+
+def spelled(variable: Variable) -> str:
+    """Symbol and name of a variable."""
+    text = symbol(variable.name)
+    return text if text == variable.name else f"{text} ({variable.name})"
+
+
+def shortened(text: str) -> str:
+    """A list of names, cut where it is long."""
+    names = text.split(", ")
+    more = len(names) - LONGEST_LIST
+    return text if more <= 0 else f"{', '.join(names[:LONGEST_LIST])} and {more} more"
 
 
 def counted(texts: Sequence[str]) -> str:
