@@ -1,0 +1,267 @@
+"""The picture of a run: the limb at a few instants above the panels over time."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limb_nodes.analysis.plot.limbs import Posture, draw_gravity, draw_limb, frame, instants, posture
+from limb_nodes.analysis.plot.panels import Column, Panel, Raster, columns_of
+from limb_nodes.analysis.plot.series import Run
+from limb_nodes.analysis.plot.thin import pooled, thinned
+from limb_nodes.errors import UserError
+from limb_nodes.model import Limb
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.gridspec import SubplotSpec
+    from matplotlib.legend import Legend
+
+SUFFIXES = (".png", ".pdf", ".svg")
+INSTANTS = 7
+# Inches, but for the part of a posture's width that gravity takes.
+HEAD_HEIGHT, LEGEND_HEIGHT, ROW_HEIGHT = 0.45, 0.3, 1.45
+COLUMN_WIDTH, LEAST_WIDTH, LEAST_STRIP, MOST_STRIP = 5.4, 9.0, 1.0, 3.5
+GRAVITY_WIDTH, LEGEND_GAP = 0.55, 0.3
+LEGEND_COLUMNS = 4
+LARGEST_DPI = 1200
+STYLE: Any = {
+    "font.size": 10,
+    "axes.titlesize": 10.5,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 5,
+    "axes.labelsize": 9.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#E6E6E6",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "xtick.labelsize": 9,
+    "ytick.labelsize": 9,
+    "svg.hashsalt": "limb",
+    "pdf.fonttype": 42,
+}
+
+
+def picture(run: Run) -> Figure:
+    """Draw a run. Every axes of a panel is labelled `column:kind:title`, of a limb `limb:time`."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    with matplotlib.rc_context(STYLE):
+        columns = columns_of(run)
+        limb = run.limb if _has_limb(run) else None
+        postures = _postures(run, limb) if limb is not None else []
+        width = max(COLUMN_WIDTH * len(columns), LEAST_WIDTH)
+        strip = _strip_height(postures, width)
+        legends = max(_legend_rows(column) for column in columns) * LEGEND_HEIGHT
+        body = max(len(column.panels) for column in columns) * ROW_HEIGHT
+        layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06, hspace=0.0, wspace=0.02)
+        figure = Figure(figsize=(width, HEAD_HEIGHT + strip + legends + body), layout=layout)
+        FigureCanvasAgg(figure)
+        heights = {"strip": strip, "legends": legends, "body": body}
+        heights = {name: height for name, height in heights.items() if height}
+        places = figure.add_gridspec(len(heights), 1, height_ratios=list(heights.values()))
+        parts = {name: places[row] for row, name in enumerate(heights)}
+        _headings(figure, run)
+        if limb is not None and postures:
+            _limbs(figure, parts["strip"], limb, postures)
+        if "legends" in parts:
+            # Holds the room for the legends, which follow the panels below it.
+            figure.add_subplot(parts["legends"], label="room").axis("off")
+        marks = [shown.time for shown in postures]
+        body_places = parts["body"].subgridspec(1, len(columns))
+        for index, column in enumerate(columns):
+            _column(figure, body_places[index], index, column, run, marks)
+        return figure
+
+
+def save(figure: Figure, path: Path, dpi: float) -> None:
+    """Write a picture, whole or not at all. Raises UserError where it cannot be written."""
+    import matplotlib
+
+    part = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    dates = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}
+    try:
+        with matplotlib.rc_context(STYLE):
+            figure.savefig(part, dpi=dpi, metadata=dates[path.suffix.lower()])
+        os.replace(part, path)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+        raise UserError(f"--out {path}: can't be written: {reason}") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _has_limb(run: Run) -> bool:
+    return run.limb is not None and run.angle is not None and set(run.limb.joint_names) <= set(run.angle.names)
+
+
+def _headings(figure: Figure, run: Run) -> None:
+    name = run.limb.name if run.limb is not None else Path(run.source).name or run.path.resolve().name
+    facts = [f"bag {run.path.resolve().name}", f"{run.start:g} to {run.end:g} s"]
+    if run.rate is not None:
+        facts.append(f"{run.rate:g} Hz")
+    if run.version:
+        facts.append(f"limb_nodes {run.version}")
+    figure.suptitle(name.replace("_", " "), fontsize=16, fontweight="bold", x=0.012, ha="left")
+    # Beside the title, so that it takes no room of its own.
+    figure.text(0.988, 1.0 - 0.12 / figure.get_figheight(), "  ·  ".join(facts), ha="right", va="top", fontsize=9.5,
+                color="#555555")  # fmt: skip
+
+
+def _postures(run: Run, limb: Limb) -> list[Posture]:
+    assert run.angle is not None
+    return [posture(run, limb, sample) for sample in instants(run.angle, INSTANTS)]
+
+
+def _strip_height(postures: list[Posture], width: float) -> float:
+    """Height that the limb takes when the postures fill the width."""
+    if not postures:
+        return 0.0
+    left, right, bottom, top = frame(postures)
+    needed = 0.82 * width / (len(postures) + GRAVITY_WIDTH) * (top - bottom) / (right - left)
+    return min(max(needed, LEAST_STRIP), MOST_STRIP) + 0.3
+
+
+def _limbs(figure: Figure, place: SubplotSpec, limb: Limb, postures: list[Posture]) -> None:
+    """The limb at some instants."""
+    left, right, bottom, top = frame(postures)
+    widths = [GRAVITY_WIDTH, *[1.0] * len(postures)]
+    grid = place.subgridspec(1, len(widths), wspace=0.0, width_ratios=widths)
+    axes = figure.add_subplot(grid[0], label="gravity")
+    axes.axis("off")
+    draw_gravity(axes, limb.gravity)
+    for index, shown in enumerate(postures):
+        axes = figure.add_subplot(grid[index + 1], label=f"limb:{shown.time:.9g}")
+        axes.set(aspect="equal", xlim=(left, right), ylim=(bottom, top))
+        axes.axis("off")
+        draw_limb(axes, limb, shown, [other for other in postures if other is not shown])
+        axes.set_title(f"{shown.time:.2f} s", loc="center", fontsize=9.5)
+
+
+def _legend_rows(column: Column) -> int:
+    return bool(column.title) + -(-len(column.muscles) // LEGEND_COLUMNS)
+
+
+def _legend(axes: Axes, column: Column) -> Legend:
+    """The joint of a column and its muscles, above its first panel and that one's title."""
+    from matplotlib.legend import Legend
+    from matplotlib.lines import Line2D
+    from matplotlib.transforms import ScaledTranslation
+
+    figure = axes.get_figure()
+    assert figure is not None
+    above = ScaledTranslation(0.0, LEGEND_GAP, figure.dpi_scale_trans)
+    handles = []
+    for _, colour, style in column.muscles:
+        handles.append(Line2D([], [], color=colour, linewidth=3))
+        handles[-1].set(linestyle=style)
+    legend = Legend(
+        axes, handles, [name for name, _, _ in column.muscles], title=column.title or None,
+        title_fontproperties={"weight": "bold", "size": 13}, alignment="left", loc="lower left",
+        bbox_to_anchor=(0.0, 1.0), bbox_transform=axes.transAxes + above, ncols=LEGEND_COLUMNS, borderaxespad=0.0,
+        borderpad=0.0, handlelength=1.4, columnspacing=1.2,
+    )  # fmt: skip
+    legend.set_in_layout(False)
+    return legend
+
+
+def _column(figure: Figure, place: SubplotSpec, index: int, column: Column, run: Run, marks: list[float]) -> None:
+    grid = place.subgridspec(len(column.panels), 1)
+    first: Axes | None = None
+    filled = [row for row, panel in enumerate(column.panels) if panel is not None]
+    for row, panel in enumerate(column.panels):
+        if panel is None:
+            continue
+        axes = figure.add_subplot(grid[row], sharex=first, label=f"{index}:{panel.kind}:{panel.title}")
+        first = first or axes
+        _panel(axes, panel, run)
+        if panel.kind == "angle":
+            for mark in marks:
+                axes.axvline(mark, color="#999999", linewidth=0.9, linestyle=":", zorder=1)
+        axes.set_xlim(run.start, run.end if run.end > run.start else run.start + 1e-3)
+        axes.tick_params(labelbottom=row == filled[-1])
+        if row == filled[-1]:
+            axes.set_xlabel("time (s)")
+    if first is not None and (column.muscles or column.title):
+        # An artist beside the panel's own legend.
+        first.add_artist(_legend(first, column))
+
+
+def _panel(axes: Axes, panel: Panel, run: Run) -> None:
+    axes.set_title(panel.title).set_in_layout(False)
+    axes.set_ylabel(panel.unit)
+    if panel.raster is not None:
+        _raster(axes, panel.raster, run)
+        return
+    for line in panel.lines:
+        times, values = thinned(line.times, line.values)
+        axes.plot(times, values, color=line.colour, linestyle=line.style, linewidth=line.width, label=line.label)
+    if panel.limits is not None:
+        axes.set_ylim(*panel.limits)
+    axes.margins(x=0)
+    if panel.bounds is not None:
+        _bounds(axes, panel.bounds)
+    handles = [
+        (handle, label)
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        if label and not label.startswith("_")
+    ]
+    if panel.legend and handles:
+        legend = axes.legend(
+            *zip(*handles, strict=True), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4,
+            borderaxespad=0.1, handlelength=1.6, columnspacing=1.0, fontsize=8.5,
+        )  # fmt: skip
+        legend.set_in_layout(False)
+
+
+def _bounds(axes: Axes, bounds: tuple[float, float]) -> None:
+    """Dashed lines at the ends of a joint's range that the angles come near."""
+    low, high = axes.get_ylim()
+    near = 0.1 * (high - low)
+    seen = [bound for bound in bounds if low - near <= bound <= high + near]
+    for index, bound in enumerate(seen):
+        axes.axhline(bound, color="#777777", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1,
+                     label="end of range" if index == 0 else "_")  # fmt: skip
+
+
+def _raster(axes: Axes, raster: Raster, run: Run) -> None:
+    """Frequencies as colours; white where a unit is silent."""
+    import matplotlib
+
+    axes.grid(False)
+    count = raster.values.shape[1]
+    if len(raster.times):
+        cells = pooled(raster.times, raster.values).T
+        step = float(np.median(np.diff(raster.times))) if len(raster.times) > 1 else run.end - run.start
+        colours = matplotlib.colormaps["viridis_r"].with_extremes(bad="white")
+        image = axes.imshow(
+            np.ma.masked_where(~(cells > 0), cells), aspect="auto", origin="lower", cmap=colours, vmin=0.0,
+            vmax=raster.top, interpolation="nearest" if count <= 60 else "antialiased",
+            extent=(raster.times[0] - step / 2, raster.times[-1] + step / 2, 0, count),
+        )  # fmt: skip
+        bar = axes.inset_axes((1.012, 0.0, 0.018, 1.0))
+        bar.set_label("colours")
+        axes.figure.colorbar(image, cax=bar).set_label(raster.unit, fontsize=9)
+    names = list(dict.fromkeys(raster.muscles))
+    sizes = [raster.muscles.count(name) for name in names]
+    ends = np.cumsum(sizes)
+    for end in ends[:-1]:
+        axes.axhline(end, color="#888888", linewidth=0.8)
+    axes.set_yticks(ends - np.array(sizes) / 2, names)
+    for label, name in zip(axes.get_yticklabels(), names, strict=True):
+        label.set_color(raster.colours[raster.muscles.index(name)])
+        label.set_fontweight("bold")
+    axes.tick_params(axis="y", length=0)
+    axes.set_ylim(0, count)
+    axes.set_ylabel("")

@@ -1,0 +1,308 @@
+"""What a picture needs of a bag, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from limb_nodes.analysis.plot.thin import FloatArray
+from limb_nodes.bags.emg import ANGLE_TOPIC, ENVELOPE_TOPIC
+from limb_nodes.bags.read import BagReader
+from limb_nodes.bags.types import RUN_INFO, TOPIC_TYPES
+from limb_nodes.errors import UserError
+from limb_nodes.model import Limb, parse_limb
+
+DRAWN = ("activation", ENVELOPE_TOPIC, "motor_unit_state", "muscle_state", "joint_torque", "joint_states", ANGLE_TOPIC)
+MUSCLE_FIELDS = (
+    "muscle_force",
+    "torque",
+    "muscle_tendon_length",
+    "muscle_length",
+    "fibre_length",
+    "tendon_length",
+    "pennation_angle",
+)
+
+
+@dataclass(frozen=True)
+class Series:
+    """Values over time: times [samples] in s, values [samples, names]."""
+
+    names: tuple[str, ...]
+    times: FloatArray
+    values: FloatArray
+
+    def column(self, name: str) -> FloatArray:
+        """The values of one name."""
+        return self.values[:, self.names.index(name)]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a bag holds. A series is None, or missing in `muscles`, where the bag lacks its topic.
+
+    limb: None in a bag without one, such as an envelope bag. drive: activations, or the envelopes of a bag without
+    activations (`is_envelope`). owners: the muscle of each motor unit of `frequency`. muscles: by field of MuscleState.
+    angle, velocity, torque: by joint, rad, rad/s, N m. reference: recorded angles by joint, rad. start, end: s.
+    source: what the bag was made of, where it holds no limb. notes: what a person should know, one sentence each.
+    """
+
+    path: Path
+    limb: Limb | None
+    rate: float | None
+    version: str
+    start: float
+    end: float
+    drive: Series | None = None
+    is_envelope: bool = False
+    frequency: Series | None = None
+    owners: tuple[str, ...] = ()
+    muscles: dict[str, Series] = field(default_factory=dict)
+    torque: Series | None = None
+    angle: Series | None = None
+    velocity: Series | None = None
+    reference: Series | None = None
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+
+class _Bag:
+    """A bag's topics under one namespace, between two times."""
+
+    def __init__(self, reader: BagReader, namespace: str, start: float | None, end: float | None) -> None:
+        self.reader = reader
+        self.prefix = _prefix(reader, namespace)
+        self.start, self.end = start, end
+        self.first, self.last = np.inf, -np.inf
+        self.offset = 0.0
+
+    def has(self, topic: str) -> bool:
+        return self.reader.has(f"{self.prefix}/{topic}")
+
+    def table(self, topic: str) -> dict[str, npt.NDArray[Any]]:
+        """A topic's fields, all of its time; `cut` takes what is asked for."""
+        table = self.reader.table(f"{self.prefix}/{topic}")
+        table["time"] = table["time"] - self.offset
+        self.first = min(self.first, float(table["time"][0]))
+        self.last = max(self.last, float(table["time"][-1]))
+        return table
+
+    def cut(self, topic: str, table: dict[str, npt.NDArray[Any]], names: tuple[str, ...], field: str) -> Series:
+        """The part of a field that is to be drawn."""
+        if field not in table:
+            raise UserError(
+                f"{self.reader.path}: topic {self.prefix}/{topic} has no field {field}; was the bag written by limb?"
+            )
+        values = table[field]
+        if values.shape[1:] != (len(names),):
+            raise UserError(
+                f"{self.reader.path}: topic {self.prefix}/{topic}: {len(names)} names and "
+                f"{'x'.join(map(str, values.shape[1:])) or 'no'} values of {field}; one each is needed"
+            )
+        times = table["time"]
+        # Half a nanosecond of slack, for times are whole nanoseconds as floating-point seconds.
+        keep = np.ones(len(times), dtype=bool)
+        if self.start is not None:
+            keep &= times >= self.start - 5e-10
+        if self.end is not None:
+            keep &= times <= self.end + 5e-10
+        return Series(names, times[keep], values[keep].astype(np.float64))
+
+    def info(self) -> dict[str, Any]:
+        """The bag's run_info, empty where there is none."""
+        topic = f"{self.prefix}/{RUN_INFO}"
+        if not self.reader.has(topic):
+            return {}
+        _, message = next(self.reader.read_topic(topic))
+        try:
+            info = YAML(typ="safe", pure=True).load(message.data)
+        except (YAMLError, AttributeError):
+            info = None
+        return info if isinstance(info, dict) else {}
+
+
+def read_run(
+    path: str | Path,
+    *,
+    namespace: str = "",
+    start: float | None = None,
+    end: float | None = None,
+    reference: str | Path | None = None,
+) -> Run:
+    """Read what a picture of a bag shows.
+
+    Args:
+        path: the bag.
+        namespace: of the limb, where the bag holds several.
+        start: first time, s; None for the bag's first.
+        end: last time, s; None for the bag's last.
+        reference: a bag with recorded angles (`reference_angle`); None takes those of the bag itself.
+
+    Raises:
+        UserError: there is no such bag, nothing in it that can be drawn, or nothing between start and end.
+    """
+    _check_times(start, end)
+    with BagReader(path) as reader:
+        bag = _Bag(reader, namespace, start, end)
+        info = bag.info()
+        limb, notes = _limb(info, str(path))
+        found: dict[str, Any] = {}
+        _read_drive(bag, found)
+        _read_units(bag, found)
+        _read_muscles(bag, found)
+        _read_joints(bag, found)
+        if reference is None and bag.has(ANGLE_TOPIC):
+            table = bag.table(ANGLE_TOPIC)
+            found["reference"] = bag.cut(ANGLE_TOPIC, table, _names(table["name"]), "position")
+    if reference is not None:
+        found["reference"] = _read_reference(reference, start, end)
+    if "reference" in found and "angle" in found:
+        found["reference"] = _matched(found["reference"], found["angle"].names, reference, notes)
+    first, last = _shown(path, bag, start, end)
+    return Run(
+        Path(path),
+        limb,
+        float(info["rate"]) if isinstance(info.get("rate"), (int, float)) else None,
+        _version(info),
+        first,
+        last,
+        source=str(info.get("source") or ""),
+        notes=tuple(notes),
+        **found,
+    )
+
+
+def _check_times(start: float | None, end: float | None) -> None:
+    for option, value in (("--from", start), ("--to", end)):
+        if value is not None and not np.isfinite(value):
+            raise UserError(f"{option} {value:g}: must be a number of seconds")
+    if start is not None and end is not None and not start < end:
+        raise UserError(f"--from {start:g} --to {end:g}: the end must be later than the start")
+
+
+def _shown(path: str | Path, bag: _Bag, start: float | None, end: float | None) -> tuple[float, float]:
+    """First and last time of the picture."""
+    if start is not None and start >= bag.last:
+        raise UserError(f"--from {start:g}: {path} ends at {bag.last:g} s; must be less")
+    if end is not None and end <= bag.first:
+        raise UserError(f"--to {end:g}: {path} starts at {bag.first:g} s; must be more")
+    first = bag.first if start is None else max(start, bag.first)
+    last = bag.last if end is None else min(end, bag.last)
+    return first, last
+
+
+def _prefix(reader: BagReader, namespace: str) -> str:
+    """The namespace of the topics to draw, as `/left`, or empty."""
+    known = {topic for topic in (*TOPIC_TYPES, ANGLE_TOPIC) if not topic.startswith("/")}
+    drawn: set[str] = set()
+    for topic in reader.topics:
+        prefix, _, name = topic.rpartition("/")
+        if name in known and name in DRAWN and reader.has(topic):
+            drawn.add(prefix)
+    there = ", ".join(sorted(prefix.strip("/") or "/" for prefix in drawn))
+    if not drawn:
+        raise UserError(
+            f"{reader.path}: nothing to draw, no message on any of {', '.join(DRAWN)}; "
+            f"the bag has {', '.join(reader.topics) or 'no topic'}"
+        )
+    if namespace:
+        asked = f"/{namespace.strip('/')}".rstrip("/")
+        if asked not in drawn:
+            raise UserError(f"{reader.path}: --namespace {namespace}: no such topics in the bag; it has {there}")
+        return asked
+    if len(drawn) > 1:
+        raise UserError(f"{reader.path}: topics of several limbs; --namespace must be one of {there}")
+    return drawn.pop()
+
+
+def _limb(info: dict[str, Any], path: str) -> tuple[Limb | None, list[str]]:
+    text = info.get("limb")
+    if not isinstance(text, str):
+        return None, []
+    try:
+        return parse_limb(text, str(info.get("limb_file") or path)), []
+    except UserError as error:
+        # A law of the user's own may be missing here; the recording can be drawn nevertheless.
+        return None, [f"drawn without the limb, which can't be read: {error}"]
+
+
+def _version(info: dict[str, Any]) -> str:
+    versions = info.get("versions")
+    return str(versions.get("limb_nodes", "")) if isinstance(versions, dict) else ""
+
+
+def _names(texts: npt.NDArray[Any]) -> tuple[str, ...]:
+    return tuple(str(text) for text in texts)
+
+
+def _read_drive(bag: _Bag, found: dict[str, Any]) -> None:
+    topic = next((topic for topic in ("activation", ENVELOPE_TOPIC) if bag.has(topic)), None)
+    if topic is not None:
+        table = bag.table(topic)
+        found["drive"] = bag.cut(topic, table, _names(table["name"]), "activation")
+        found["is_envelope"] = topic == ENVELOPE_TOPIC
+
+
+def _read_units(bag: _Bag, found: dict[str, Any]) -> None:
+    topic = "motor_unit_state"
+    if bag.has(topic):
+        table = bag.table(topic)
+        found["frequency"] = bag.cut(topic, table, _names(table["unit"]), "stimulation_frequency")
+        found["owners"] = _names(table["muscle"])
+
+
+def _read_muscles(bag: _Bag, found: dict[str, Any]) -> None:
+    topic = "muscle_state"
+    if bag.has(topic):
+        table = bag.table(topic)
+        names = _names(table["name"])
+        found["muscles"] = {field: bag.cut(topic, table, names, field) for field in MUSCLE_FIELDS}
+
+
+def _read_joints(bag: _Bag, found: dict[str, Any]) -> None:
+    if bag.has("joint_torque"):
+        table = bag.table("joint_torque")
+        found["torque"] = bag.cut("joint_torque", table, _names(table["joint"]), "torque")
+    if bag.has("joint_states"):
+        table = bag.table("joint_states")
+        names = _names(table["name"])
+        found["angle"] = bag.cut("joint_states", table, names, "position")
+        # JointState may leave velocities out.
+        if table["velocity"].shape[1:] == (len(names),):
+            found["velocity"] = bag.cut("joint_states", table, names, "velocity")
+
+
+def _read_reference(path: str | Path, start: float | None, end: float | None) -> Series:
+    with BagReader(path) as reader:
+        if not reader.has(ANGLE_TOPIC):
+            raise UserError(
+                f"--reference {path}: no message on {ANGLE_TOPIC}; the bag has {', '.join(reader.topics) or 'no topic'}"
+            )
+        bag = _Bag(reader, "", start, end)
+        # A run counts its time from the recording's first sample on.
+        bag.offset = float(reader.table(f"{bag.prefix}/{ANGLE_TOPIC}")["time"][0])
+        table = bag.table(ANGLE_TOPIC)
+        return bag.cut(ANGLE_TOPIC, table, _names(table["name"]), "position")
+
+
+def _matched(found: Series, joints: tuple[str, ...], given: str | Path | None, notes: list[str]) -> Series | None:
+    """The recorded angles under the names of the joints they belong to."""
+    if len(found.names) == len(joints) == 1:
+        return Series(joints, found.times, found.values)
+    same = [name for name in found.names if name in joints]
+    if same:
+        return Series(tuple(same), found.times, np.stack([found.column(name) for name in same], axis=1))
+    line = (
+        f"recorded angles {', '.join(found.names)}: none is named after a joint, {', '.join(joints)}; "
+        f"name them with `limb emg --angle {found.names[0]}={joints[0]}`"
+    )
+    if given is not None:
+        raise UserError(f"--reference {given}: {line}")
+    notes.append(line)
+    return None

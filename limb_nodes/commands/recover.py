@@ -1,0 +1,33 @@
+"""`limb recover`: a readable bag of what a killed recorder left."""
+
+from __future__ import annotations
+
+import argparse
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the arguments of `limb recover`."""
+    parser = subparsers.add_parser(
+        "recover",
+        help="make a readable bag of one that was not closed",
+        description="Copy every message that can still be read from a bag whose recorder was killed, or that is "
+        "damaged, to a new bag. The old one stays as it is.",
+    )
+    parser.add_argument("bag", metavar="BAG", help="folder of the bag, or the .mcap file in it")
+    parser.add_argument("-o", "--out", required=True, metavar="OUT", help="folder of the new bag, which must not exist")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Recover, and print what was found."""
+    from limb_nodes.bags.recover import recover
+
+    found = recover(args.bag, args.out)
+    width = max(len(topic) for topic in found.counts)
+    for topic, count in sorted(found.counts.items()):
+        print(f"{topic.ljust(width)}  {count} message{'s' if count != 1 else ''}")
+    if found.truncated:
+        print("the file is damaged or ends within a record; what came after that place is lost")
+    else:
+        print("nothing is lost")
+    print(f"bag {found.path}, up to {found.end_ns * 1e-9:g} s")
+    return 0
