@@ -49,6 +49,7 @@ class MuscleStack(LimbNode):
         self.tick = -1
         self.angle, self.velocity = np.zeros(n), np.zeros(n)
         self.drive = self.stepper.drive(np.zeros(len(self.muscles)))
+        self.last_drive: np.ndarray | None = None
         self.excitation = np.zeros(len(self.muscles))
         self.inputs: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self.last: int | None = None
@@ -115,10 +116,12 @@ class MuscleStack(LimbNode):
         excitation, drive = self.inputs.get(tick, (self.excitation, self.drive))
         if self.tick >= 0:
             period = (tick - self.tick) * self.ticks.period
-            self.stepper.advance((self.angle, self.velocity), (angle, velocity), self.drive, drive, period)
+            before, after = (self.angle, self.velocity), (angle, velocity)
+            self.stepper.advance(before, after, self.drive, drive, period, self.last_drive)
+        self.last_drive = self.drive if tick == self.tick + 1 and self.tick >= 0 else None
         self.tick, self.angle, self.velocity, self.drive = tick, angle, velocity, drive
         next_drive = drive if following is None else following[1]
-        rows = self.stepper.torque(angle, velocity, drive, next_drive, self.ticks.period)
+        rows = self.stepper.torque(angle, velocity, drive, next_drive, self.ticks.period, self.last_drive)
         header = Header(stamp=self.ticks.stamp(tick))
         if tick % self.state_every == 0 and self.state_publishers:
             self.publish_states(header, tick, excitation)

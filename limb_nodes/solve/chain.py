@@ -60,19 +60,14 @@ def joint_equations(n, p, q, v, tip_x, tip_y, tip_torque, w):
 
 
 @njit(**OPTIONS)
-def solve_free(n, locked, w, right, out):
-    """Solve the rows of free joints, by Cholesky decomposition in place; 0 for locked joints.
-
-    w: inertia matrix [n, n], overwritten. right: offset in w of the right-hand side [n],
-    overwritten.
-    """
+def factor_free(n, locked, w):
+    """Cholesky factor of the inertia matrix w [n, n] in place, locked joints left out."""
     for k in range(n):
         if locked[k] != 0.0:
             for other in range(n):
                 w[k * n + other] = 0.0
                 w[other * n + k] = 0.0
             w[k * n + k] = 1.0
-            w[right + k] = 0.0
     for k in range(n):
         for other in range(k + 1):
             total = w[k * n + other]
@@ -82,25 +77,31 @@ def solve_free(n, locked, w, right, out):
                 w[k * n + k] = math.sqrt(total)
             else:
                 w[k * n + other] = total / w[other * n + other]
-        total = w[right + k]
+
+
+@njit(**OPTIONS)
+def substitute(n, locked, w, right):
+    """Solve for right [n] in place with the factor w; 0 for locked joints."""
+    for k in range(n):
+        total = right[k] if locked[k] == 0.0 else 0.0
         for i in range(k):
-            total -= w[k * n + i] * w[right + i]
-        w[right + k] = total / w[k * n + k]
+            total -= w[k * n + i] * right[i]
+        right[k] = total / w[k * n + k]
     for k in range(n - 1, -1, -1):
-        total = w[right + k]
+        total = right[k]
         for i in range(k + 1, n):
-            total -= w[i * n + k] * out[i]
-        out[k] = total / w[k * n + k]
+            total -= w[i * n + k] * right[i]
+        right[k] = total / w[k * n + k]
 
 
 @njit(**OPTIONS)
 def acceleration(n, p, q, v, torque, tip_x, tip_y, tip_torque, locked, out, w):
     """Joint accelerations out [n] (rad/s^2) by 3.11, zero for joints on their limit."""
     joint_equations(n, p, q, v, tip_x, tip_y, tip_torque, w)
-    right = n * n
     for k in range(n):
-        w[right + k] += torque[k]
-    solve_free(n, locked, w, right, out)
+        out[k] = w[n * n + k] + torque[k]
+    factor_free(n, locked, w)
+    substitute(n, locked, w, out)
 
 
 @njit(**OPTIONS)
@@ -121,10 +122,49 @@ def impact(n, p, q, v, locked, w):
     The momenta of the free joints are kept: M_ff v_f' = M_ff v_f + M_fl v_l.
     """
     joint_equations(n, p, q, v, 0.0, 0.0, 0.0, w)
-    momentum = n * n
+    momentum = w[n * n : n * n + n]
     for k in range(n):
         total = 0.0
         for other in range(n):
             total += w[k * n + other] * v[other]
-        w[momentum + k] = total
-    solve_free(n, locked, w, momentum, v)
+        momentum[k] = total
+    factor_free(n, locked, w)
+    substitute(n, locked, w, momentum)
+    for k in range(n):
+        v[k] = momentum[k]
+
+
+@njit(**OPTIONS)
+def bias_slopes(n, p, v, acceleration, tip_x, tip_y, w, by_angle, by_velocity):
+    """Slopes of (torque of motion, gravity and load) - (inertia matrix) (acceleration).
+
+    by_angle, by_velocity: [n, n], change of the torque about joint k (row) with the angle or
+    velocity of a joint (column), accelerations held. w: as `joint_equations` has left it, of
+    which sines, cosines and segment velocities are read.
+    """
+    cosine, sine, speed = n * n + n, n * n + 2 * n, n * n + 3 * n
+    moments, lengths = 3 + n * n, 3 + n * n + n
+    for k in range(n):
+        ck, sk = w[cosine + k], w[sine + k]
+        own = p[moments + k] * (-sk * p[2] - ck * p[1])
+        own += p[lengths + k] * (-sk * tip_y - ck * tip_x)
+        spin = 0.0
+        for other in range(n):
+            cp, sp = w[cosine + other], w[sine + other]
+            spin += acceleration[other]
+            turn = w[speed + other]
+            coupling = p[3 + k * n + other]
+            between_sine, between_cosine = sk * cp - ck * sp, ck * cp + sk * sp
+            by_velocity[k, other] = -2.0 * coupling * between_sine * turn
+            if other != k:
+                pull = coupling * (between_cosine * turn * turn - between_sine * spin)
+                by_angle[k, other] = pull
+                own -= pull
+        by_angle[k, k] = own
+    for matrix in (by_angle, by_velocity):
+        for k in range(n - 2, -1, -1):
+            for other in range(n):
+                matrix[k, other] += matrix[k + 1, other]
+        for k in range(n):
+            for other in range(n - 2, -1, -1):
+                matrix[k, other] += matrix[k, other + 1]

@@ -19,7 +19,7 @@ from limb_nodes.solve import chain
 from limb_nodes.solve.generate import program
 
 IMPORTS = (
-    "from limb_nodes.solve.chain import acceleration, impact, reaction\n"
+    "from limb_nodes.solve.chain import acceleration, bias_slopes, impact, reaction, substitute\n"
     "from limb_nodes.solve.pointer import SIGNATURE\n\n\n"
 )
 

@@ -389,8 +389,8 @@ def muscle_primal(equations: Equations, number: int, kind: MuscleKind, observe: 
 def newton(body: Body, kind: MuscleKind) -> None:
     """Find the total fibre force F that the fibres exert at the velocity that F allows.
 
-    The force falls with the fibre velocity, which rises with F: the root is unique and lies
-    between 0 and the force at F = 0.
+    The force falls with the fibre velocity, which rises with F: total(F) never rises, so the root
+    is unique and lies between any F and total(F). The last root found is where the search starts.
     """
     inner = Body(body.equations, {"total_fibre_force"})
     inner.compute(kind.stages["loop"])
@@ -399,11 +399,13 @@ def newton(body: Body, kind: MuscleKind) -> None:
         f"total, slope = units_force(fibre_velocity, {inner.slope('fibre_velocity')}, first, last, p, k, w)",
     ]
     body.add(
-        "total_fibre_force = 0.0",
+        "total_fibre_force = w[wo]",
+        "if not abs(total_fibre_force) < 1e300:",
+        "    total_fibre_force = 0.0",
         "d_total_fibre_force = 1.0",
         *evaluate,
-        "low = min(0.0, total)",
-        "high = max(0.0, total)",
+        "low = min(total_fibre_force, total)",
+        "high = max(total_fibre_force, total)",
         "for _ in range(80):",
         "    residual = total - total_fibre_force",
         "    if residual > 0.0:",
@@ -413,13 +415,14 @@ def newton(body: Body, kind: MuscleKind) -> None:
         "    else:",
         "        break",
         "    guess = total_fibre_force + residual / (1.0 - slope)",
-        "    if not (low < guess < high):",
+        "    if not (low <= guess <= high):",
         "        guess = 0.5 * (low + high)",
-        "    settled = abs(guess - total_fibre_force) <= 4e-16 * abs(guess)",
+        # Newton's method squares the relative error: behind such a step only rounding is left.
+        "    settled = abs(guess - total_fibre_force) <= 1e-9 * abs(guess)",
         "    total_fibre_force = guess",
-        *(f"    {line}" for line in evaluate),
         "    if settled:",
         "        break",
+        *(f"    {line}" for line in evaluate),
     )
 
 

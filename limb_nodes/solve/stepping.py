@@ -13,8 +13,9 @@ import numpy as np
 
 from limb_nodes.model.layout import FloatArray
 from limb_nodes.model.limb import Limb
-from limb_nodes.solve import explicit
+from limb_nodes.solve.integrate import DONE, EXPLICIT, integrate
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.pieces import bent, straight
 from limb_nodes.solve.whole import FAILURES, SolveError, WholeModel
 
 TICK_TOLERANCE = 1e-9
@@ -53,10 +54,12 @@ class MuscleStepper:
         drive: FloatArray,
         next_drive: FloatArray,
         period: float,
+        last_drive: FloatArray | None = None,
     ) -> FloatArray:
         """Torque [n] (N m) and its slopes in angle, velocity and time, rows of [4, n].
 
-        drive, next_drive: at this tick and one `period` (s) later.
+        drive, next_drive: at this tick and one `period` (s) later. last_drive: one period before,
+        where it is known; the input is then a parabola instead of a straight line.
         """
         n, program = self.joints, self.model.program
         self._state[:n] = angle
@@ -69,7 +72,7 @@ class MuscleStepper:
             self._state,
             layout.parameters,
             layout.index,
-            np.stack([drive, next_drive]),
+            interval(last_drive, drive, next_drive),
             self._context,
             out,
         )
@@ -82,10 +85,12 @@ class MuscleStepper:
         drive: FloatArray,
         next_drive: FloatArray,
         period: float,
+        last_drive: FloatArray | None = None,
     ) -> None:
         """Advance the internal states over one `period` (s).
 
-        before, after: joint angles and velocities at its ends. Raises SolveError.
+        before, after: joint angles and velocities at its ends; drives as for `torque` at its start.
+        Raises SolveError.
         """
         if self.internal.size == 0:
             return
@@ -95,8 +100,10 @@ class MuscleStepper:
         c[program.CUBIC : program.TORQUE] = np.concatenate([*before, *after])
         self._progress[:3] = 0.0
         self._progress[3] = period
-        status = explicit.integrate(
+        status = integrate(
+            EXPLICIT,
             program.muscle_rates_c.address,
+            0,
             0,
             0,
             0.0,
@@ -107,7 +114,7 @@ class MuscleStepper:
             self._scale,
             layout.parameters,
             layout.index,
-            np.stack([drive, next_drive]),
+            interval(last_drive, drive, next_drive),
             c,
             0,
             0,
@@ -117,7 +124,7 @@ class MuscleStepper:
             period,
             self._progress,
         )
-        if status != explicit.DONE:
+        if status != DONE:
             raise SolveError(f"{self.model.limb.file}: the muscles cannot be advanced: {FAILURES[status]}")
 
     def observe(self, angle: FloatArray, velocity: FloatArray, excitation: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -200,8 +207,10 @@ class LimbStepper:
         program, layout, n = self.model.program, self.model.layout, self.joints
         self._progress[:3] = 0.0
         self._progress[3] = period
-        status = explicit.integrate(
+        status = integrate(
+            EXPLICIT,
             program.limb_rates_c.address,
+            0,
             program.limb_reactions_c.address,
             program.strike_c.address,
             0.0,
@@ -222,7 +231,7 @@ class LimbStepper:
             period,
             self._progress,
         )
-        if status != explicit.DONE:
+        if status != DONE:
             raise SolveError(f"{self.model.limb.file}: the limb cannot be advanced: {FAILURES[status]}")
         self._predict(period, struck=bool(np.any(self._context[program.LOCKED :][:n] != held)))
 
@@ -242,3 +251,10 @@ class LimbStepper:
         self._torque[4] = self._state[: self.joints]
         self._torque[5] = self._state[self.joints :]
         self._torque[6] = 0.0
+
+
+def interval(last_drive: FloatArray | None, drive: FloatArray, next_drive: FloatArray) -> FloatArray:
+    """The input over one tick."""
+    if last_drive is None:
+        return straight(drive, next_drive)
+    return bent(last_drive, drive, next_drive)

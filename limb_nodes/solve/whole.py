@@ -10,16 +10,28 @@ import numpy as np
 from limb_nodes.errors import UserError
 from limb_nodes.model.layout import FloatArray, Layout, build_layout
 from limb_nodes.model.limb import Limb
-from limb_nodes.solve import explicit
 from limb_nodes.solve.compile import compiled
+from limb_nodes.solve.integrate import (
+    DONE,
+    EXPLICIT,
+    IMPLICIT,
+    NOT_FINITE,
+    STEP_TOO_SMALL,
+    TOO_MANY_STEPS,
+    integrate,
+)
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.pieces import corners, pieces
 
 ANGLE_SCALE, VELOCITY_SCALE = 1.0, 10.0
 TOLERANCE = 1e-9
+METHODS = {"explicit": EXPLICIT, "implicit": IMPLICIT}
+# Rate (1/s) from which steps that accuracy allows would be unstable with the explicit method.
+STIFF = 2000.0
 FAILURES = {
-    explicit.TOO_MANY_STEPS: "it needs too many steps",
-    explicit.STEP_TOO_SMALL: "the step became too small",
-    explicit.NOT_FINITE: "a rate is not a finite number",
+    TOO_MANY_STEPS: "it needs too many steps",
+    STEP_TOO_SMALL: "the step became too small",
+    NOT_FINITE: "a rate is not a finite number",
 }
 
 
@@ -86,11 +98,27 @@ class WholeModel:
         c[:5] = [start, period, *self.limb.tip_force, self.limb.tip_torque]
         return c
 
+    def slopes(self, state: FloatArray, excitation: FloatArray) -> FloatArray:
+        """Slopes of the rates [states, states] (Jacobian) at a state under excitations [muscles]."""
+        size = state.size
+        out = np.empty(size * (size + 1))
+        u = pieces(self.drives(excitation[np.newaxis, :]))
+        layout = self.layout
+        self.program.jacobian(0.0, state, layout.parameters, layout.index, u, self.context(0.0, 1.0), out)
+        return out[: size * size].reshape(size, size)
+
+    def stiffness(self) -> float:
+        """Fastest rate (1/s) of the limb at its start with all muscles fully excited."""
+        slopes = self.slopes(self.initial_state(), np.ones(self.layout.muscles))
+        return float(np.abs(np.linalg.eigvals(slopes)).max())
+
+    def suited_method(self) -> int:
+        """The implicit method where stability would hold the explicit one to small steps."""
+        return IMPLICIT if self.stiffness() > STIFF else EXPLICIT
+
     def drives(self, excitation: FloatArray) -> FloatArray:
-        """What the input does to muscles and motor units [T, drives], at least two rows."""
+        """What the input [T, muscles] does to muscles and motor units [T, drives]."""
         given = np.ascontiguousarray(excitation, dtype=np.float64)
-        if len(given) == 1:
-            given = np.repeat(given, 2, axis=0)
         out = np.zeros((len(given), self.layout.drives))
         self.program.drives(given, self.layout.parameters, self.layout.index, out)
         return out
@@ -101,27 +129,33 @@ class WholeModel:
         rate: float,
         *,
         tolerance: float = TOLERANCE,
+        method: str = "auto",
         observe: bool = True,
     ) -> Movement:
         """Solve over the span of an input.
 
         excitation: [T, muscles], sampled at `rate` Hz from t = 0; what it does to the motor units
-            is linear between samples.
+            is smooth between samples, but for corners (`limb_nodes.solve.pieces`).
         tolerance: of the local error, relative to the state or its typical size.
+        method: "explicit", "implicit", or "auto", which chooses by `stiffness`.
         observe: whether to fill in what muscles and motor units show.
         Raises SolveError where the equations cannot be solved further.
         """
         count = len(excitation)
         period = 1.0 / rate
         times: FloatArray = np.arange(count, dtype=np.float64) * period
-        u = self.drives(excitation)
+        samples = self.drives(excitation)
+        u = pieces(samples)
         y = self.initial_state()
         out = np.empty((count, y.size))
         c = self.context(0.0, period)
         progress = np.zeros(4)
+        chosen = METHODS[method] if method in METHODS else self.suited_method()
         layout, program = self.layout, self.program
-        status = explicit.integrate(
+        status = integrate(
+            chosen,
             program.rates_c.address,
+            program.jacobian_c.address,
             program.reactions_c.address,
             program.strike_c.address,
             0.0,
@@ -137,12 +171,12 @@ class WholeModel:
             layout.joints,
             self.limit_offset,
             program.LOCKED,
-            kinks(u, period),
+            kinks(samples, period),
             tolerance,
             0.1,
             progress,
         )
-        if status != explicit.DONE:
+        if status != DONE:
             raise SolveError(f"{self.limb.file}: the solution stops at {progress[2]:.6g} s: {FAILURES[status]}")
         return self.movement(times, out, excitation, u, c, progress, observe)
 
@@ -198,15 +232,10 @@ class WholeModel:
         )
 
 
-def kinks(u: FloatArray, period: float) -> FloatArray:
-    """Times of the input samples at which a drive changes its slope sharply.
+def kinks(samples: FloatArray, period: float) -> FloatArray:
+    """Times of the input samples at which a drive has a corner.
 
-    A step of high order must not cross such a time: it would not notice. A drive that bends
-    smoothly has second differences of the order of the period squared.
+    A step of high order must not cross such a time: it would not notice.
     """
-    if len(u) < 3 or u.shape[1] == 0:
-        return np.empty(0)
-    bend = np.abs(np.diff(u, n=2, axis=0))
-    sharp = (bend > 1e-3).any(axis=1)
-    found: FloatArray = (np.flatnonzero(sharp) + 1).astype(np.float64) * period
+    found: FloatArray = np.flatnonzero(corners(samples).any(axis=1)).astype(np.float64) * period
     return found

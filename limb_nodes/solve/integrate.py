@@ -1,0 +1,326 @@
+"""Advancing states in time with step control, joint limits as events, and dense output, compiled.
+
+Two methods: explicit (`limb_nodes.solve.explicit`) where the motion sets the step, implicit
+(`limb_nodes.solve.implicit`) where stiff muscles or light segments would.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, types
+
+from limb_nodes.solve import explicit, implicit
+from limb_nodes.solve.pointer import call
+
+f8, i8 = types.float64, types.int64
+vector, integers, table = f8[::1], i8[::1], f8[:, ::1]
+explicit_step, explicit_error, explicit_between = explicit.step, explicit.error_norm, explicit.interpolate
+implicit_step, implicit_error, implicit_between = implicit.step, implicit.error_norm, implicit.interpolate
+
+EXPLICIT, IMPLICIT = 0, 1
+DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2, 3
+# Joints within this distance (rad) of a limit are on it.
+TOUCH = 1e-12
+# After a release the joint is left alone for this long (s), so that rounding cannot catch it again.
+LEAST_FLIGHT = 1e-9
+MOST_STEPS = 2e8
+
+
+@njit(cache=True, error_model="numpy")
+def overshoot(new_y, limits, joints, locked):
+    """The free joint farthest beyond its limit and how far (rad); joint -1 where there is none."""
+    joint, worst = -1, TOUCH
+    for j in range(joints):
+        if locked[j] == 0.0:
+            beyond = max(new_y[j] - limits[joints + j], limits[j] - new_y[j])
+            if beyond > worst:
+                joint, worst = j, beyond
+    return joint, worst
+
+
+@njit(cache=True, error_model="numpy")
+def pulled_back(reaction, joints, locked):
+    """The joint on a limit that is pulled off it most strongly, and the pull (N m), or -1."""
+    joint, worst = -1, 0.0
+    for j in range(joints):
+        if locked[j] != 0.0 and locked[j] * reaction[j] > worst:
+            joint, worst = j, locked[j] * reaction[j]
+    return joint, worst
+
+
+@njit(cache=True, error_model="numpy")
+def lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy):
+    """Lock the joints that start on a limit and press against it."""
+    for _ in range(joints):
+        call(rates, t, y, p, k, u, c, dy)
+        found = False
+        for j in range(joints):
+            if locked[j] != 0.0:
+                continue
+            for side, limit in ((1.0, limits[joints + j]), (-1.0, limits[j])):
+                if side * (y[j] - limit) >= -TOUCH:
+                    outward = side * y[joints + j]
+                    if outward > 0.0 or (outward == 0.0 and side * dy[joints + j] > 0.0):
+                        locked[j] = side
+                        y[j] = limit
+                        found = True
+        if not found:
+            break
+
+
+@njit(cache=True, error_model="numpy")
+def take_step(method, rates, t, h, y, stages, slopes, p, k, u, c, stage_y, new_y, matrix, pivots, start_rates):
+    """One step of size h by either method; start_rates and slopes are those at t."""
+    if method == IMPLICIT:
+        implicit_step(rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+    else:
+        for i in range(y.size):
+            stages[0, i] = start_rates[i]
+        explicit_step(rates, t, h, y, stages, p, k, u, c, stage_y, new_y)
+
+
+SIGNATURE = types.int64(
+    i8,
+    i8,
+    i8,
+    i8,
+    i8,
+    f8,
+    f8,
+    vector,
+    vector,
+    table,
+    vector,
+    vector,
+    integers,
+    table,
+    vector,
+    i8,
+    i8,
+    i8,
+    vector,
+    f8,
+    f8,
+    vector,
+)
+
+
+@njit(SIGNATURE, cache=True, error_model="numpy", nogil=True)
+def integrate(
+    method,
+    rates,
+    jacobian,
+    reactions,
+    strike,
+    start,
+    end,
+    y,
+    times,
+    out,
+    scale,
+    p,
+    k,
+    u,
+    c,
+    joints,
+    limit_offset,
+    locked_offset,
+    stops,
+    tolerance,
+    longest,
+    progress,
+):
+    """Advance y in place from start to end and fill out [times, states]; a status.
+
+    method: EXPLICIT or IMPLICIT. rates, jacobian, reactions, strike: addresses of the program's
+    functions; jacobian is used by the implicit method, the last two where there are joints.
+    joints: the first `joints` states are angles, the next as many their velocities; 0 where there
+        are no limits. Limits stand in p at limit_offset, the flags of joints on a limit in c at
+        locked_offset.
+    stops: times (rising) that no step may cross: kinks of the input.
+    longest: greatest step. progress: [steps, rejected, time reached, next step]; the next step is
+        read at the start where it is positive.
+    """
+    n = y.size
+    stages = np.empty((7, n))
+    stage_y, new_y, start_rates = np.empty(n), np.empty(n), np.empty(n)
+    stiff = method == IMPLICIT
+    slopes = np.empty(n * (n + 1) if stiff else 0)
+    matrix = np.empty((n, n) if stiff else (0, 0))
+    pivots = np.empty(n if stiff else 0, dtype=np.int64)
+    limits = p[limit_offset : limit_offset + 2 * joints]
+    locked = c[locked_offset : locked_offset + joints]
+    span = end - start
+    t = start
+    row, stop = 0, 0
+    while row < times.size and times[row] <= start:
+        out[row] = y
+        row += 1
+    if joints > 0:
+        lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, start_rates)
+        for j in range(joints):
+            if locked[j] != 0.0 and y[joints + j] != 0.0:
+                call(strike, t, y, p, k, u, c, stage_y)
+                break
+    call(rates, t, y, p, k, u, c, start_rates)
+    fresh = False
+    h = progress[3] if progress[3] > 0.0 else min(longest, span) * 0.01
+    h = min(h, longest)
+    power = -0.25 if stiff else -0.2
+    last_error = 1e-4
+    quiet_until = start
+    while t < end:
+        if progress[0] + progress[1] > MOST_STEPS:
+            progress[2] = t
+            return TOO_MANY_STEPS
+        while stop < stops.size and stops[stop] <= t + 1e-15 * max(1.0, abs(t)):
+            stop += 1
+        barrier = min(end, stops[stop]) if stop < stops.size else end
+        wanted = h
+        clipped = t + 1.0000001 * h >= barrier
+        if clipped:
+            h = barrier - t
+        if h < 1e-14 * max(1.0, abs(t)) and not clipped:
+            progress[2] = t
+            return STEP_TOO_SMALL
+        if stiff and not fresh:
+            call(jacobian, t, y, p, k, u, c, slopes)
+            fresh = True
+        take_step(
+            method,
+            rates,
+            t,
+            h,
+            y,
+            stages,
+            slopes,
+            p,
+            k,
+            u,
+            c,
+            stage_y,
+            new_y,
+            matrix,
+            pivots,
+            start_rates,
+        )
+        if stiff:
+            error = implicit_error(y, new_y, stages, scale, tolerance)
+        else:
+            error = explicit_error(h, y, new_y, stages, scale, tolerance)
+        if not error <= 1.0:
+            if not math.isfinite(error):
+                if h < 1e-12:
+                    progress[2] = t
+                    return NOT_FINITE
+                h *= 0.1
+            else:
+                h *= max(0.2, 0.9 * error**power)
+            progress[1] += 1
+            continue
+        event = 0
+        joint = -1
+        if joints > 0:
+            joint, _ = overshoot(new_y, limits, joints, locked)
+            if joint >= 0:
+                event = 1
+            elif t + h > quiet_until:
+                call(reactions, t + h, new_y, p, k, u, c, stage_y)
+                joint, _ = pulled_back(stage_y, joints, locked)
+                if joint >= 0:
+                    event = 2
+        side, limit = 1.0, 0.0
+        if event != 0:
+            # Shorten the step until the event lies at its end (Illinois variant of false position).
+            short, long = 0.0, h
+            short_value, long_value = -1.0, 0.0
+            if event == 1:
+                side = 1.0 if new_y[joint] > limits[joints + joint] else -1.0
+                limit = limits[joints + joint] if side > 0.0 else limits[joint]
+                short_value = min(-1e-300, side * (y[joint] - limit))
+                long_value = side * (new_y[joint] - limit)
+            else:
+                long_value = locked[joint] * stage_y[joint]
+                call(reactions, t, y, p, k, u, c, stage_y)
+                short_value = min(-1e-300, locked[joint] * stage_y[joint])
+            for _ in range(60):
+                part = short_value / (short_value - long_value)
+                h = short + min(0.99, max(0.01, part)) * (long - short)
+                take_step(
+                    method,
+                    rates,
+                    t,
+                    h,
+                    y,
+                    stages,
+                    slopes,
+                    p,
+                    k,
+                    u,
+                    c,
+                    stage_y,
+                    new_y,
+                    matrix,
+                    pivots,
+                    start_rates,
+                )
+                if event == 1:
+                    value = side * (new_y[joint] - limit)
+                else:
+                    call(reactions, t + h, new_y, p, k, u, c, stage_y)
+                    value = locked[joint] * stage_y[joint]
+                if value > 0.0:
+                    if value > 0.5 * long_value:
+                        short_value *= 0.5
+                    long, long_value = h, value
+                else:
+                    if value < 0.5 * short_value:
+                        long_value *= 0.5
+                    short, short_value = h, min(-1e-300, value)
+                near = abs(value) <= 1e-13 if event == 1 else False
+                if near or long - short <= 1e-12 * max(1e-3, h):
+                    break
+        while row < times.size and times[row] <= t + h * (1.0 + 1e-12):
+            part = min(1.0, (times[row] - t) / h)
+            if stiff:
+                implicit_between(part, y, new_y, stages, out[row])
+            else:
+                explicit_between(part, h, y, new_y, stages, out[row])
+            row += 1
+        t = barrier if clipped and event == 0 else t + h
+        for i in range(n):
+            y[i] = new_y[i]
+        progress[0] += 1
+        fresh = False
+        if event == 1:
+            y[joint] = limit
+            locked[joint] = side
+            call(strike, t, y, p, k, u, c, stage_y)
+            h = max(h, 0.1 * wanted)
+        elif event == 2:
+            locked[joint] = 0.0
+            quiet_until = t + LEAST_FLIGHT
+            h = max(h, 0.1 * wanted)
+        else:
+            if stiff:
+                growth = 0.9 * max(error, 1e-10) ** -0.25
+            else:
+                growth = 0.9 * max(error, 1e-10) ** -0.14 * last_error**0.08
+            last_error = max(error, 1e-4)
+            h = h * min(5.0, max(0.2, growth))
+            if clipped:
+                h = max(h, wanted)
+        h = min(h, longest)
+        if event != 0 or stiff:
+            call(rates, t, y, p, k, u, c, start_rates)
+        else:
+            for i in range(n):
+                start_rates[i] = stages[6, i]
+    while row < times.size:
+        out[row] = y
+        row += 1
+    progress[2] = t
+    progress[3] = h
+    return DONE
