@@ -17,7 +17,7 @@ from limb_nodes.levels.sarcomere.bond_moments import loss_0, loss_1, loss_2
 # Bonds just made, as a share of all sites, that are always counted in: the mean length of no bonds
 # at all would be 0/0. Just made, they have the moments 1, 2/3 and 1/2 of f.
 FRESH = 1e-8
-STEPS = 7.0
+STEPS = 15.0
 
 
 @equation("P_0", "maximum_sarcomere_force")
