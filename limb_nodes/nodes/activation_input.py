@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from limb_msgs.msg import MuscleActivation
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
 
 from limb_nodes.bags.activation import Activation, load_activation
 from limb_nodes.errors import UserError
-from limb_nodes.nodes.base import LimbNode, floats
+from limb_nodes.nodes.base import LimbNode
 from limb_nodes.nodes.qos import LIVE, STREAM
 from limb_nodes.nodes.running import main_of
+from limb_nodes.nodes.wire import Incoming, Outgoing
 
 
 class ActivationInput(LimbNode):
@@ -48,8 +48,11 @@ class ActivationInput(LimbNode):
             self.create_subscription(MuscleActivation, "emg_envelope", self.on_envelope, LIVE)
         self.newest = np.zeros(len(self.muscles))
         self.sent = -1
-        self.publisher = self.create_publisher(MuscleActivation, "activation", STREAM)
-        self.create_subscription(JointState, "joint_states", self.on_joint_states, STREAM)
+        example = MuscleActivation(name=self.muscles, activation=[0.0] * len(self.muscles))
+        publisher = self.create_publisher(MuscleActivation, "activation", STREAM)
+        self.activation = Outgoing(publisher, example, self.ticks.nanoseconds)
+        self.joint_states = Incoming(JointState, "name", self.ticks.nanoseconds)
+        self.create_subscription(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
 
     def on_envelope(self, message: MuscleActivation) -> None:
         """Take over a live envelope where every value is good."""
@@ -63,23 +66,17 @@ class ActivationInput(LimbNode):
         found = f"is {given[name]:g}" if name in given else "is missing"
         self.complain(f"emg_envelope: {name} {found}, a number from 0 to 1 is needed")
 
-    def on_joint_states(self, message: JointState) -> None:
+    def on_joint_states(self, data: bytes) -> None:
         """Send what the tick of the message and the next one need."""
-        last = self.ticks.tick(message.header.stamp) + 1
+        last = self.joint_states.read(data) + 1
         if self.final is not None and last >= self.final:
             last = self.final
             self.finished = True
         for tick in range(self.sent + 1, last + 1):
-            values = self.newest if self.source is None else self.source.values[tick]
-            self.publisher.publish(
-                MuscleActivation(
-                    header=Header(stamp=self.ticks.stamp(tick)),
-                    tick=tick,
-                    name=self.muscles,
-                    activation=floats(values),
-                    last=tick == self.final,
-                )
-            )
+            values = self.activation.values
+            values["activation"][:] = self.newest if self.source is None else self.source.values[tick]
+            values["last"][...] = tick == self.final
+            self.activation.publish(tick)
         self.sent = max(self.sent, last)
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import array
 import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
@@ -82,13 +80,6 @@ class LimbNode(Node):
         if now - self._last_complaint >= 1.0:
             self._last_complaint = now
             self.get_logger().warning(f"{what}; kept the last good value ({self.bad_input} so far)")
-
-
-def floats(values: np.ndarray) -> array.array[float]:
-    """Numbers for a float64[] field, without a check per number."""
-    result = array.array("d")
-    result.frombytes(np.ascontiguousarray(values, dtype=np.float64).tobytes())
-    return result
 
 
 def finite(*fields: Sequence[float]) -> bool:

@@ -15,12 +15,14 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, Int64, String
 
 from limb_nodes.model.points import point_names, points
-from limb_nodes.nodes.base import LimbNode, finite, floats
+from limb_nodes.nodes.base import LimbNode, finite
 from limb_nodes.nodes.qos import LATCHED, LIVE, RECORDER_LAG, STREAM
 from limb_nodes.nodes.running import main_of
 from limb_nodes.nodes.urdf import urdf
+from limb_nodes.nodes.wire import Incoming, Outgoing
 from limb_nodes.solve.stepping import LimbStepper
 
+TORQUE_FIELDS = ("torque", "slope_angle", "slope_velocity", "slope_time")
 REMEMBERED = 1000
 REPORT_PERIOD = 1.0
 
@@ -42,22 +44,21 @@ class LimbDynamics(LimbNode):
         self.stepper = LimbStepper(self.limb)
         self.stepper.acceleration(np.zeros((4, self.stepper.joints)))
         self.joints = self.limb.joint_names
-        self.points = point_names(self.limb)
         self.tick = 0
         self.missed = 0
         self.recorded = -1
-        self.pending: JointTorque | None = None
+        self.pending: bytes | None = None
         self.newest: tuple[int, np.ndarray] | None = None
         self.history: OrderedDict[int, tuple[np.ndarray, np.ndarray]] = OrderedDict()
         self.started_at: float | None = None
         self.last_report = 0.0
         self.last_tick: int | None = None
-        self.state_publisher = self.create_publisher(JointState, "joint_states", STREAM)
-        self.pattern_publisher = self.create_publisher(MovementPattern, "movement_pattern", STREAM)
+        self.joint_states, self.pattern = self.messages()
+        self.torque = Incoming(JointTorque, "joint", self.ticks.nanoseconds)
         self.diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", LIVE)
         self.description = self.create_publisher(String, "robot_description", LATCHED)
         self.description.publish(String(data=urdf(self.limb)))
-        self.create_subscription(JointTorque, "joint_torque", self.on_torque, STREAM)
+        self.create_subscription(JointTorque, "joint_torque", self.on_torque, STREAM, raw=True)
         self.create_subscription(WrenchStamped, "external_load", self.on_load, LIVE)
         if self.awaits_recorder:
             self.create_subscription(Int64, "recorder_progress", self.on_recorded, LATCHED)
@@ -67,16 +68,29 @@ class LimbDynamics(LimbNode):
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(self.ticks.period, self.on_timer, clock=steady)
 
+    def messages(self) -> tuple[Outgoing, Outgoing]:
+        """The messages of joint states and of the movement pattern."""
+        zeros, points_of = [0.0] * len(self.joints), point_names(self.limb)
+        states = JointState(name=self.joints, position=zeros, velocity=zeros)
+        pattern = MovementPattern(
+            joint=self.joints,
+            angle=zeros,
+            velocity=zeros,
+            acceleration=zeros,
+            point=points_of,
+            position=[Point() for _ in points_of],
+        )
+        nanoseconds = self.ticks.nanoseconds
+        return (
+            Outgoing(self.create_publisher(JointState, "joint_states", STREAM), states, nanoseconds),
+            Outgoing(self.create_publisher(MovementPattern, "movement_pattern", STREAM), pattern, nanoseconds),
+        )
+
     def offer(self) -> None:
         """Publish the joint states of the current tick."""
-        self.state_publisher.publish(
-            JointState(
-                header=Header(stamp=self.ticks.stamp(self.tick)),
-                name=self.joints,
-                position=floats(self.stepper.angle),
-                velocity=floats(self.stepper.velocity),
-            )
-        )
+        values = self.joint_states.values
+        values["position"][:], values["velocity"][:] = self.stepper.angle, self.stepper.velocity
+        self.joint_states.publish(self.tick)
 
     def on_recorded(self, message: Int64) -> None:
         """The recorder has every tick up to this one; -1 when it is ready."""
@@ -98,25 +112,33 @@ class LimbDynamics(LimbNode):
         else:
             self.complain("external_load: a force or torque is not finite")
 
-    def on_torque(self, message: JointTorque) -> None:
+    def on_torque(self, data: bytes) -> None:
         """Take over a torque; in lockstep also step."""
-        if message.joint == self.joints:
-            rows = np.array([message.torque, message.slope_angle, message.slope_velocity, message.slope_time])
+        message = self.torque
+        try:
+            tick = message.read(data)
+        except ValueError as problem:
+            self.complain(f"joint_torque: {problem}")
+            return
+        rows = np.empty((4, len(self.joints)))
+        fields = [message[name] for name in TORQUE_FIELDS]
+        if message.names == self.joints and all(len(field) == len(self.joints) for field in fields):
+            rows[:] = fields
         else:
-            rows = np.array([])
-        if rows.shape != (4, len(self.joints)) or not np.isfinite(rows).all():
-            self.complain(f"joint_torque of tick {message.tick}: finite numbers for {', '.join(self.joints)} needed")
+            rows[:] = np.nan
+        if not np.isfinite(rows).all():
+            self.complain(f"joint_torque of tick {tick}: finite numbers for {', '.join(self.joints)} needed")
             return
-        if message.last:
-            self.last_tick = message.tick
+        if message.flag("last"):
+            self.last_tick = tick
         if self.mode == "realtime":
-            if self.newest is None or message.tick > self.newest[0]:
-                self.newest = message.tick, rows
+            if self.newest is None or tick > self.newest[0]:
+                self.newest = tick, rows
             return
-        if message.tick != self.tick or self.finished:
+        if tick != self.tick or self.finished:
             return
         if self.awaits_recorder and self.tick - self.recorded > RECORDER_LAG:
-            self.pending = message
+            self.pending = data
             return
         self.step(rows)
 
@@ -171,18 +193,11 @@ class LimbDynamics(LimbNode):
 
     def publish_pattern(self, acceleration: np.ndarray) -> None:
         """Publish angles, velocities, accelerations and points of this tick."""
-        self.pattern_publisher.publish(
-            MovementPattern(
-                header=Header(stamp=self.ticks.stamp(self.tick)),
-                tick=self.tick,
-                joint=self.joints,
-                angle=floats(self.stepper.angle),
-                velocity=floats(self.stepper.velocity),
-                acceleration=floats(acceleration),
-                point=self.points,
-                position=[Point(x=x, y=y) for x, y in points(self.limb, self.stepper.angle)],
-            )
-        )
+        values = self.pattern.values
+        values["angle"][:], values["velocity"][:] = self.stepper.angle, self.stepper.velocity
+        values["acceleration"][:] = acceleration
+        values["position"][:, :2] = points(self.limb, self.stepper.angle)
+        self.pattern.publish(self.tick)
 
     def report(self) -> None:
         """Publish how real time is kept."""

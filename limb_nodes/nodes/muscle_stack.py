@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from limb_msgs.msg import JointTorque, MotorUnitState, MuscleActivation, MuscleState, SarcomereState
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
 
-from limb_nodes.nodes.base import LimbNode, finite, floats
+from limb_nodes.nodes.base import LimbNode
 from limb_nodes.nodes.qos import STREAM
 from limb_nodes.nodes.running import main_of
+from limb_nodes.nodes.wire import Incoming, Outgoing
 from limb_nodes.solve.outputs import (
     MUSCLE_FIELDS,
     MUSCLE_OUTPUTS,
@@ -32,19 +32,8 @@ class MuscleStack(LimbNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("muscle_stack", **options)
         self.state_every = self.whole("state_every", 1, "publish the states every so many ticks", 1, 1_000_000)
-        self.state_publishers = {
-            topic: self.create_publisher(kind, topic, STREAM)
-            for topic, kind in (
-                ("muscle_state", MuscleState),
-                ("motor_unit_state", MotorUnitState),
-                ("sarcomere_state", SarcomereState),
-            )
-            if self.switch(f"publish_{topic}", True, f"whether to publish {topic}")
-        }
         self.stepper = MuscleStepper(self.limb)
         self.muscles = self.limb.muscle_names
-        self.owners = [muscle.name for muscle in self.limb.muscles for _ in muscle.units]
-        self.units = [unit.name for muscle in self.limb.muscles for unit in muscle.units]
         n = len(self.limb.segments)
         self.tick = -1
         self.angle, self.velocity = np.zeros(n), np.zeros(n)
@@ -54,50 +43,88 @@ class MuscleStack(LimbNode):
         self.inputs: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self.last: int | None = None
         self.waiting: tuple[int, np.ndarray, np.ndarray] | None = None
-        self.torque_publisher = self.create_publisher(JointTorque, "joint_torque", STREAM)
-        self.create_subscription(MuscleActivation, "activation", self.on_activation, STREAM)
-        self.create_subscription(JointState, "joint_states", self.on_joint_states, STREAM)
+        joints = self.limb.joint_names
+        zeros = [0.0] * n
+        example = JointTorque(joint=joints, torque=zeros, slope_angle=zeros, slope_velocity=zeros, slope_time=zeros)
+        nanoseconds = self.ticks.nanoseconds
+        self.torque = Outgoing(self.create_publisher(JointTorque, "joint_torque", STREAM), example, nanoseconds)
+        self.states = self.state_topics()
+        self.activation = Incoming(MuscleActivation, "name", nanoseconds)
+        self.joint_states = Incoming(JointState, "name", nanoseconds)
+        self.create_subscription(MuscleActivation, "activation", self.on_activation, STREAM, raw=True)
+        self.create_subscription(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
 
-    def on_activation(self, message: MuscleActivation) -> None:
+    def state_topics(self) -> list[tuple[Outgoing, list[tuple[np.ndarray, np.ndarray]]]]:
+        """The topics of states that are switched on: messages, and pairs of what to copy where."""
+        muscles, units = self.stepper.shown
+        of_unit = {
+            "muscle": [muscle.name for muscle in self.limb.muscles for _ in muscle.units],
+            "unit": [unit.name for muscle in self.limb.muscles for unit in muscle.units],
+        }
+        topics = []
+        for topic, kind, texts, fields, outputs, shown in (
+            ("muscle_state", MuscleState, {"name": self.muscles}, MUSCLE_FIELDS, MUSCLE_OUTPUTS, muscles),
+            ("motor_unit_state", MotorUnitState, of_unit, UNIT_FIELDS, UNIT_OUTPUTS, units),
+            (
+                "sarcomere_state",
+                SarcomereState,
+                of_unit,
+                SARCOMERE_FIELDS,
+                UNIT_OUTPUTS,
+                units,
+            ),
+        ):
+            if not self.switch(f"publish_{topic}", True, f"whether to publish {topic}"):
+                continue
+            example = kind(**texts, **{field: [0.0] * len(shown) for field in fields})
+            message = Outgoing(self.create_publisher(kind, topic, STREAM), example, self.ticks.nanoseconds)
+            copies = [(message.values[field], shown[:, outputs.index(name)]) for field, name in fields.items()]
+            topics.append((message, copies))
+        return topics
+
+    def on_activation(self, data: bytes) -> None:
         """Keep the activation of a tick."""
-        if message.last:
-            self.last = message.tick
-        if message.tick <= self.tick or message.tick in self.inputs:
+        message = self.activation
+        try:
+            tick = message.read(data)
+        except ValueError as problem:
+            self.complain(f"activation: {problem}")
             return
-        if message.name == self.muscles:
-            values = np.array(message.activation)
-        else:
-            given = dict(zip(message.name, message.activation, strict=False))
-            values = np.array([given.get(name, np.nan) for name in self.muscles])
+        if message.flag("last"):
+            self.last = tick
+        if tick <= self.tick or tick in self.inputs:
+            return
+        values = in_order(message, "activation", self.muscles)
         good = (values >= 0.0) & (values <= 1.0)
         if not good.all():
             name = self.muscles[int(np.flatnonzero(~good)[0])]
-            self.complain(f"activation of tick {message.tick}: {name} is not a number from 0 to 1")
+            self.complain(f"activation of tick {tick}: {name} is not a number from 0 to 1")
             values = np.where(good, values, self.excitation)
         self.excitation = values
-        self.inputs[message.tick] = values, self.stepper.drive(values)
+        self.inputs[tick] = values, self.stepper.drive(values)
         self.answer()
 
-    def on_joint_states(self, message: JointState) -> None:
+    def on_joint_states(self, data: bytes) -> None:
         """Keep the joint states; in real time the ones before are answered first, with what is there."""
-        tick = self.ticks.tick(message.header.stamp)
+        message = self.joint_states
+        try:
+            tick = message.read(data)
+        except ValueError as problem:
+            self.complain(f"joint_states: {problem}")
+            return
         if tick <= self.tick or (self.waiting is not None and tick <= self.waiting[0]):
             return
-        if message.name == self.limb.joint_names:
-            angle, velocity = message.position, message.velocity
-        else:
-            place = {name: index for index, name in enumerate(message.name)}
-            if not place.keys() >= set(self.limb.joint_names):
-                self.complain(f"joint_states of tick {tick}: a joint of {', '.join(self.limb.joint_names)} is missing")
-                return
-            angle = [message.position[place[name]] for name in self.limb.joint_names]
-            velocity = [message.velocity[place[name]] for name in self.limb.joint_names]
-        if not finite(angle, velocity):
-            self.complain(f"joint_states of tick {tick}: an angle or velocity is not finite")
+        angle = in_order(message, "position", self.limb.joint_names)
+        velocity = in_order(message, "velocity", self.limb.joint_names)
+        if not (np.isfinite(angle).all() and np.isfinite(velocity).all()):
+            self.complain(
+                f"joint_states of tick {tick}: finite angles and velocities of "
+                f"{', '.join(self.limb.joint_names)} are needed"
+            )
             return
         if self.waiting is not None and self.mode == "realtime":
             self.send(None)
-        self.waiting = tick, np.array(angle), np.array(velocity)
+        self.waiting = tick, angle, velocity
         self.answer()
 
     def answer(self) -> None:
@@ -122,38 +149,29 @@ class MuscleStack(LimbNode):
         self.tick, self.angle, self.velocity, self.drive = tick, angle, velocity, drive
         next_drive = drive if following is None else following[1]
         rows = self.stepper.torque(angle, velocity, drive, next_drive, self.ticks.period, self.last_drive)
-        header = Header(stamp=self.ticks.stamp(tick))
-        if tick % self.state_every == 0 and self.state_publishers:
-            self.publish_states(header, tick, excitation)
-        self.torque_publisher.publish(
-            JointTorque(
-                header=header,
-                tick=tick,
-                joint=self.limb.joint_names,
-                torque=floats(rows[0]),
-                slope_angle=floats(rows[1]),
-                slope_velocity=floats(rows[2]),
-                slope_time=floats(rows[3]),
-                last=tick == self.last,
-            )
-        )
+        if self.states and tick % self.state_every == 0:
+            self.stepper.observe(angle, velocity, excitation)
+            for states, copies in self.states:
+                for target, source in copies:
+                    target[:] = source
+                states.publish(tick)
+        values = self.torque.values
+        values["torque"][:], values["slope_angle"][:] = rows[0], rows[1]
+        values["slope_velocity"][:], values["slope_time"][:] = rows[2], rows[3]
+        values["last"][...] = tick == self.last
+        self.torque.publish(tick)
         self.finished = tick == self.last
         for old in [key for key in self.inputs if key < tick]:
             del self.inputs[old]
 
-    def publish_states(self, header: Header, tick: int, excitation: np.ndarray) -> None:
-        """Publish what muscles, motor units and sarcomeres show at a tick."""
-        muscles, units = self.stepper.observe(self.angle, self.velocity, excitation)
-        muscle = {name: muscles[:, index] for index, name in enumerate(MUSCLE_OUTPUTS)}
-        unit = {name: units[:, index] for index, name in enumerate(UNIT_OUTPUTS)}
-        for topic, kind, names, fields, columns in (
-            ("muscle_state", MuscleState, {"name": self.muscles}, MUSCLE_FIELDS, muscle),
-            ("motor_unit_state", MotorUnitState, {"muscle": self.owners, "unit": self.units}, UNIT_FIELDS, unit),
-            ("sarcomere_state", SarcomereState, {"muscle": self.owners, "unit": self.units}, SARCOMERE_FIELDS, unit),
-        ):
-            if topic in self.state_publishers:
-                values = {field: floats(columns[name]) for field, name in fields.items()}
-                self.state_publishers[topic].publish(kind(header=header, tick=tick, **names, **values))
+
+def in_order(message: Incoming, field: str, names: list[str]) -> np.ndarray:
+    """Numbers of a message in the order of `names`, NaN for those that it lacks."""
+    values = message[field]
+    if message.names == names and len(values) == len(names):
+        return values.astype(np.float64)
+    given = dict(zip(message.names, values, strict=False))
+    return np.array([given.get(name, np.nan) for name in names])
 
 
 main = main_of(MuscleStack)

@@ -108,11 +108,15 @@ def run_in_one_process(run: Run, progress: Progress) -> Outcome:
         gc.freeze()
         recorder, dynamics = nodes["recorder"], nodes["limb_dynamics"]
         started = None
+        shown = -2
         while not (recorder.finished or interrupt.wanted):
             executor.spin_once(timeout_sec=0.05)
             if started is None and dynamics.tick > 0:
                 started = time.monotonic()
-            progress(recorder.announced)
+            if recorder.announced != shown:
+                shown = recorder.announced
+                progress(shown)
+                refuse_company(dynamics)
         ended = time.monotonic()
         return Outcome(
             ticks=recorder.counts["joint_states"],
@@ -127,6 +131,15 @@ def run_in_one_process(run: Run, progress: Progress) -> Outcome:
             node.destroy_node()
         with suppress(Exception):
             rclpy.shutdown(context=context)
+
+
+def refuse_company(node: Any) -> None:
+    """Raise UserError where another limb publishes on the same topics."""
+    if node.count_publishers("joint_states") > 1:
+        raise UserError(
+            f"{node.resolve_topic_name('joint_states')} is published by another run too; give this one a --namespace, "
+            "or another ROS_DOMAIN_ID"
+        )
 
 
 def run_in_processes(run: Run, progress: Progress) -> Outcome:
@@ -150,6 +163,7 @@ def run_in_processes(run: Run, progress: Progress) -> Outcome:
         while children["recorder"].poll() is None and not interrupt.wanted:
             executor.spin_once(timeout_sec=0.05)
             progress(recorded["tick"])
+            refuse_company(observer)
             if started is None and recorded["tick"] > 0:
                 started = time.monotonic()
             for name, child in children.items():

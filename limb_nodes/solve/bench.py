@@ -16,6 +16,7 @@ from scipy.optimize import root
 
 from limb_nodes.errors import UserError
 from limb_nodes.levels.muscle.prescribed_path import prescribed
+from limb_nodes.levels.sarcomere.lengths import optimal_sarcomere_length
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.layout import FloatArray, build_layout
 from limb_nodes.model.limb import Limb, Muscle, Segment
@@ -170,6 +171,29 @@ class MuscleBench:
         ) or old.index.tolist() != new.index.tolist():
             raise ValueError(f"{muscle.name} has other laws or units than the muscle on the bench")
         self.limb, self.muscle, self.model.layout = changed, muscle, new
+
+    def optimal_length(self) -> float:
+        """Length (m) from origin to insertion at which fibres of mean optimal length hang on a slack tendon.
+
+        Raises UserError where no length gives it, as an aponeurosis may have it.
+        """
+        optimal = [
+            unit.values["series_sarcomeres"] * optimal_sarcomere_length(unit.laws["sarcomere"].values["actin_length"])
+            for unit in self.muscle.units
+        ]
+        wanted = sum(optimal) / len(optimal)
+        aponeurosis = self.muscle.laws["aponeurosis"].values.get("length", 0.0)
+        muscle_length = np.linspace(0.0, 2.0 * wanted + aponeurosis, 20001)[1:]
+        states = np.tile(self.model.layout.initial_states, (len(muscle_length), 1))
+        tendon = self.muscle.laws["tendon"].values
+        at_start = tendon.get("length", tendon.get("slack_length", 0.0))
+        still = np.zeros(len(muscle_length))
+        fibre = self._record(still, muscle_length + at_start, still, still, states).fibre_length
+        crossing = np.flatnonzero((fibre[:-1] < wanted) & (fibre[1:] >= wanted))
+        if not crossing.size:
+            raise UserError(f"{self.limb.file}: no length of {self.muscle.name} gives its fibres {wanted:g} m")
+        row = slice(crossing[-1], crossing[-1] + 2)
+        return float(np.interp(wanted, fibre[row], muscle_length[row])) + tendon.get("slack_length", 0.0)
 
     def run(
         self,

@@ -42,6 +42,11 @@ class MuscleStepper:
         self._progress = np.zeros(4)
         self._rows: dict[int, FloatArray] = {}
 
+    @property
+    def shown(self) -> tuple[FloatArray, FloatArray]:
+        """The arrays that `observe` fills in."""
+        return self._muscles, self._units
+
     def drive(self, excitation: FloatArray) -> FloatArray:
         """What excitations [muscles] do to muscles and motor units [drives]."""
         found: FloatArray = self.model.drives(excitation[np.newaxis, :])[0]

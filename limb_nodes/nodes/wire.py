@@ -1,0 +1,115 @@
+"""Messages as bytes that are filled in and read in place.
+
+The messages of a topic differ from tick to tick in their numbers alone. Building a message object
+and turning it into bytes, or back, costs several times what the transport does; here the bytes are
+made once, and afterwards only the numbers in them are written or read.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rclpy.serialization import serialize_message
+
+from limb_nodes.bags.columns import Layout
+from limb_nodes.bags.types import limb_typestore
+from limb_nodes.nodes.ticks import SECOND
+
+STAMP = slice(4, 12)
+
+
+def type_name(kind: type) -> str:
+    """The name of a message class, such as limb_msgs/msg/JointTorque."""
+    package, folder, *_ = kind.__module__.split(".")
+    return f"{package}/{folder}/{kind.__name__}"
+
+
+class Outgoing:
+    """Messages of one publisher.
+
+    values: by field name, an array of the message's numbers that is written to.
+    """
+
+    def __init__(self, publisher: Any, example: Any, nanoseconds: int) -> None:
+        """example: a message with its names, and sequences of the right length."""
+        self.publisher = publisher
+        self.nanoseconds = nanoseconds
+        self._data = bytearray(serialize_message(example))
+        layout = Layout(bytes(self._data), limb_typestore())
+        layout.message(type_name(type(example)), "")
+        self._stamp = np.frombuffer(self._data, dtype="<u4", count=2, offset=STAMP.start)
+        self.values = {
+            name: np.frombuffer(
+                self._data, dtype=dtype, count=int(np.prod(shape, dtype=np.int64)), offset=start
+            ).reshape(shape)
+            for name, (start, dtype, shape) in layout.numbers.items()
+        }
+        self._tick = self.values.get("tick")
+
+    def publish(self, tick: int) -> None:
+        """Send the numbers as those of a tick."""
+        self._stamp[0], self._stamp[1] = divmod(tick * self.nanoseconds, SECOND)
+        if self._tick is not None:
+            self._tick[...] = tick
+        self.publisher.publish(bytes(self._data))
+
+
+class Incoming:
+    """Messages of one raw subscription.
+
+    names: the texts of the field that names the numbers, in the message's order.
+    """
+
+    def __init__(self, kind: type, names: str, nanoseconds: int) -> None:
+        self.nanoseconds = nanoseconds
+        self.names: list[str] = []
+        self._kind = type_name(kind)
+        self._field = names
+        self._size = -1
+        self._constant: list[tuple[int, int, bytes]] = []
+        self._numbers: dict[str, tuple[int, np.dtype[Any], int]] = {}
+
+    def read(self, data: bytes) -> int:
+        """Take in a message; its tick by its stamp. Raises ValueError if it is no such message."""
+        if len(data) != self._size or any(data[a:b] != text for a, b, text in self._constant):
+            self._learn(data)
+        self._data = data
+        sec = int.from_bytes(data[4:8], "little", signed=True)
+        stamp = sec * SECOND + int.from_bytes(data[8:12], "little")
+        return round(stamp / self.nanoseconds)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A field of the message last read, as an array that must not be kept."""
+        start, dtype, count = self._numbers[name]
+        return np.frombuffer(self._data, dtype=dtype, count=count, offset=start)
+
+    def flag(self, name: str) -> bool:
+        """A field of type bool of the message last read."""
+        return self._data[self._numbers[name][0]] != 0
+
+    def _learn(self, data: bytes) -> None:
+        """Find where everything is in messages of this size with these names."""
+        layout = Layout(data, limb_typestore())
+        try:
+            layout.message(self._kind, "")
+        except (IndexError, UnicodeDecodeError) as problem:
+            raise ValueError(f"not a {self._kind}: {problem}") from None
+        self._size = len(data)
+        self._constant = [(a, b, data[a:b]) for a, b in joined(layout.constant)]
+        self._numbers = {
+            name: (start, dtype, int(np.prod(shape, dtype=np.int64)))
+            for name, (start, dtype, shape) in layout.numbers.items()
+        }
+        self.names = list(layout.texts[self._field])
+
+
+def joined(ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Ranges with those that touch made one."""
+    found: list[tuple[int, int]] = []
+    for start, end in ranges:
+        if found and found[-1][1] == start:
+            found[-1] = found[-1][0], end
+        elif end > start:
+            found.append((start, end))
+    return found
