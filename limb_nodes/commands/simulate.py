@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     """Solve, record, print a summary."""
     from limb_nodes.bags.activation import load_activation
     from limb_nodes.bags.write import refuse_existing
-    from limb_nodes.model import load_limb
+    from limb_nodes.model import load_limb, user_sources
 
     limb = load_limb(args.limb)
     if args.tolerance is not None and not 1e-14 <= args.tolerance <= 1e-2:
@@ -68,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
         info = {
             "limb": limb.text,
             "limb_file": limb.file,
+            "laws": user_sources(limb),
             "command": shlex.join(["limb", *sys.argv[1:]]),
             "rate": args.rate,
             "parameters": {"simulate": {"activation": args.activation, "tolerance": args.tolerance or TOLERANCE}},

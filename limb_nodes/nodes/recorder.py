@@ -27,6 +27,7 @@ from limb_nodes.bags.types import TOPIC_TYPES
 from limb_nodes.bags.versions import versions
 from limb_nodes.bags.write import BagWriter, refuse_existing
 from limb_nodes.errors import UserError
+from limb_nodes.model import user_sources
 from limb_nodes.nodes.base import NODES, LimbNode
 from limb_nodes.nodes.qos import LATCHED, LIVE, STREAM
 from limb_nodes.nodes.running import main_of
@@ -140,6 +141,7 @@ class Recorder(LimbNode):
         return {
             "limb": self.limb.text,
             "limb_file": self.limb.file,
+            "laws": user_sources(self.limb),
             "command": self.command,
             "rate": self.ticks.rate,
             "period_ns": self.ticks.nanoseconds,

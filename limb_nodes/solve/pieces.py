@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limb_nodes.model.layout import FloatArray
+
+BoolArray = NDArray[np.bool_]
 
 # A corner: a second difference above this, and this much above those beside it. A drive is at most 1 and a
 # smooth one sampled well below its period has second differences of the order of the period squared.
@@ -36,9 +39,9 @@ def bent(earlier: FloatArray, before: FloatArray, after: FloatArray) -> FloatArr
     return found.reshape(1, -1)
 
 
-def corners(samples: FloatArray) -> FloatArray:
+def corners(samples: FloatArray) -> BoolArray:
     """Whether each sample [T, n] is a corner [T, n]."""
-    found = np.zeros(samples.shape, dtype=bool)
+    found: BoolArray = np.zeros(samples.shape, dtype=np.bool_)
     if len(samples) < 3:
         return found
     bend = np.abs(np.diff(samples, n=2, axis=0))
