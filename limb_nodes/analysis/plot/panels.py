@@ -216,16 +216,20 @@ def _joint_lines(series: Series, joints: Sequence[str], label: str, factor: floa
     ]
 
 
+def _of_joint(text: str, joints: Sequence[str]) -> str:
+    """`text` with the joint's name, where that leaves room for a legend beside it."""
+    return f"{text} {joints[0]}" if len(joints) == 1 and len(joints[0]) <= 10 else text.split()[0]
+
+
 def _torque(run: Run, muscles: Sequence[str], joints: Sequence[str]) -> Panel | None:
     by_muscle = _muscle_lines(run, run.muscles["torque"], muscles) if "torque" in run.muscles else ()
     net = _joint_lines(run.torque, joints, "net torque") if run.torque is not None else []
     if not by_muscle and not net:
         return None
-    title = f"Torque at the {joints[0]}" if len(joints) == 1 else "Torque"
     # Where one muscle works alone, its line lies on the broader one of the net torque.
     broad = tuple(Line(line.label, line.times, line.values, NET, line.style, BROAD) for line in net)
     thin = tuple(Line("", line.times, line.values, line.colour, line.style) for line in by_muscle)
-    return Panel("torque", title, "N m", (*broad, *thin), legend=True)
+    return Panel("torque", _of_joint("Torque at the", joints), "N m", (*broad, *thin), legend=True)
 
 
 def _angle(run: Run, joints: Sequence[str]) -> Panel | None:
@@ -245,16 +249,14 @@ def _angle(run: Run, joints: Sequence[str]) -> Panel | None:
         if segment.joint_range is not None:
             low, high = np.degrees(segment.joint_range)
             bounds = float(low), float(high)
-    title = f"Angle of the {joints[0]}" if len(joints) == 1 else "Joint angle"
-    return Panel("angle", title, "deg", tuple(lines), bounds=bounds, legend=True)
+    return Panel("angle", _of_joint("Angle of the", joints), "deg", tuple(lines), bounds=bounds, legend=True)
 
 
 def _velocity(run: Run, joints: Sequence[str]) -> Panel | None:
     if run.velocity is None:
         return None
     lines = _joint_lines(run.velocity, joints, "", 180.0 / np.pi)
-    title = f"Velocity of the {joints[0]}" if len(joints) == 1 else "Joint velocity"
-    return Panel("velocity", title, "deg/s", tuple(lines), legend=len(lines) > 1)
+    return Panel("velocity", _of_joint("Velocity of the", joints), "deg/s", tuple(lines), legend=len(lines) > 1)
 
 
 def _lengths(run: Run, muscles: Sequence[str]) -> list[Panel | None]:
