@@ -1,0 +1,188 @@
+"""`limb verify`: every case of the report's section 3.3, by the whole-model solve and by the graph of nodes."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import shlex
+import signal
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from limb_nodes.errors import UserError
+
+if TYPE_CHECKING:
+    from limb_nodes.analysis.course import Course
+    from limb_nodes.analysis.verification import Case, Finding
+    from limb_nodes.model.limb import Limb
+
+WAYS = ("whole", "graph")
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the command."""
+    parser = subparsers.add_parser(
+        "verify",
+        help="check the model against the cases of the report's section 3.3",
+        description="Run every case by the whole-model solve and by the graph of nodes at 1 kHz, and compare what "
+        "they show with what mechanics expects. Exit status 1 where a quantity is out of its tolerance.",
+    )
+    way = parser.add_mutually_exclusive_group()
+    way.add_argument("--whole", action="store_true", help="only the whole-model solve")
+    way.add_argument("--graph", action="store_true", help="only the graph of nodes")
+    parser.add_argument("--case", action="append", metavar="NAME", help="only this case, such as 3.6-range; repeatable")
+    parser.add_argument("--json", action="store_true", help="print a list of findings as JSON")
+    parser.add_argument("--figures", metavar="DIR", help="redraw the report's figures, one PNG per case")
+    parser.add_argument(
+        "--limbs", metavar="DIR", help="take reference_joint.yaml and reference_joint_tendon.yaml from here"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the cases, print, draw; 1 where a quantity is not as expected."""
+    from limb_nodes.analysis.verification import CASES, examine
+
+    cases = chosen(args.case, CASES)
+    folder = Path(args.limbs) if args.limbs else None
+    limbs = {case.name: case.build(folder) for case in cases}
+    pictures = made(args.figures)
+    ways = ("whole",) if args.whole else ("graph",) if args.graph else WAYS
+    courses: dict[str, dict[str, Course]] = {case.name: {} for case in cases}
+    findings: list[Finding] = []
+    for way in ways:
+        for case in cases:
+            course = run_case(case, limbs[case.name], way)
+            findings += examine(case, way, course)
+            if course is not None:
+                courses[case.name][way] = course
+    if pictures:
+        from limb_nodes.analysis.verification_figures import draw
+
+        for case in cases:
+            if courses[case.name]:
+                path = pictures / f"figure_{case.name.replace('.', '_').replace('-', '_')}.png"
+                draw(case, limbs[case.name].muscle_names, courses[case.name], path)
+    if args.json:
+        print(json.dumps([finding.plain() for finding in findings], indent=1))
+    else:
+        print(table(cases, ways, findings))
+        if pictures:
+            print(f"\nfigures: {pictures}")
+    return 0 if all(finding.passed for finding in findings) else 1
+
+
+def chosen(names: Sequence[str] | None, cases: Sequence[Case]) -> list[Case]:
+    """The cases that were asked for, all by default."""
+    known = [case.name for case in cases]
+    for name in names or ():
+        if name not in known:
+            raise UserError(f"--case is {name!r}; allowed: {', '.join(known)}")
+    return [case for case in cases if not names or case.name in names]
+
+
+def made(folder: str | None) -> Path | None:
+    """The folder for the figures, made if need be."""
+    if folder is None:
+        return None
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise UserError(f"--figures {folder}: cannot be made: {problem.strerror or problem}") from None
+    return path
+
+
+def run_case(case: Case, limb: Limb, way: str) -> Course | None:
+    """Run a case one way; None, and a line, where the equations cannot be solved."""
+    from limb_nodes.analysis.verification import solve_whole
+    from limb_nodes.solve.whole import SolveError
+
+    try:
+        return solve_whole(case, limb) if way == "whole" else solve_graph(case, limb)
+    except SolveError as problem:
+        print(f"limb: case {case.name} by {way}: {problem}", file=sys.stderr)
+        return None
+
+
+def solve_graph(case: Case, limb: Limb) -> Course:
+    """Run a case by the nodes, in one process, into a bag that lives as long as this takes."""
+    from limb_nodes.analysis.course import course_of_bag
+    from limb_nodes.analysis.verification import RATE
+    from limb_nodes.nodes.session import Run, run_in_one_process
+    from limb_nodes.solve.whole import SolveError
+
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    with tempfile.TemporaryDirectory(prefix="limb_verify_") as folder:
+        file, source, bag = (Path(folder) / name for name in ("limb.yaml", "activation.csv", "bag"))
+        write_limb(limb, file)
+        write_activation(case, limb, source)
+        wanted = Run(
+            limb=str(file),
+            source=str(source),
+            rate=RATE,
+            duration=case.duration,
+            out=str(bag),
+            # No other run, and no case before this one, is heard here.
+            namespace=f"/limb_verify_{os.getpid()}_{case.name.replace('.', '_').replace('-', '_')}",
+            states=Run.states if case.states else (),
+            command=shlex.join(["limb", *sys.argv[1:]]),
+        )
+        try:
+            outcome = run_in_one_process(wanted, lambda tick: None)
+        finally:
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+        if outcome.interrupted:
+            raise KeyboardInterrupt
+        if outcome.missing or outcome.ticks != round(case.duration * RATE) + 1:
+            raise SolveError(f"{outcome.ticks} ticks recorded, {outcome.missing} messages missing")
+        return course_of_bag(bag)
+
+
+def write_limb(limb: Limb, path: Path) -> None:
+    """Write a limb as it is now, which its text may not say."""
+    from ruamel.yaml import YAML
+
+    with path.open("w", encoding="utf-8") as file:
+        YAML(typ="safe", pure=True).dump(limb.content, file)
+
+
+def write_activation(case: Case, limb: Limb, path: Path) -> None:
+    """Write the very numbers that the whole-model solve is given."""
+    from limb_nodes.analysis.verification import RATE
+
+    lines = [",".join(["time", *limb.muscle_names])]
+    lines += [
+        ",".join(repr(float(value)) for value in (tick / RATE, *row)) for tick, row in enumerate(case.drive(limb))
+    ]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def table(cases: Sequence[Case], ways: Sequence[str], findings: Sequence[Finding]) -> str:
+    """Expected, found, tolerance and verdict of every quantity."""
+    found = {(f.case.name, f.quantity.name, f.solver): f for f in findings}
+    width = max(len(quantity.name) for case in cases for quantity in case.quantities)
+    head = f"  {'quantity':{width}} {'expected':>12}" + "".join(f" {way:>12}" for way in ways)
+    lines = [f"{head} {'tolerance':>10}  verdict"]
+    for case in cases:
+        lines.append(f"case {case.name}: {case.set_up}")
+        for quantity in case.quantities:
+            of = [found[case.name, quantity.name, way] for way in ways]
+            values = "".join(f" {number(finding.found):>12}" for finding in of)
+            failed = [finding.solver for finding in of if not finding.passed]
+            verdict = f"FAILED ({', '.join(failed)})" if failed else "passed"
+            row = f"  {quantity.name:{width}} {number(quantity.expected):>12}{values} {quantity.tolerance:>10.2g}"
+            lines.append(f"{row}  {verdict}")
+    bad = sum(not finding.passed for finding in findings)
+    lines.append(f"{len(findings) - bad} of {len(findings)} passed" + (f", {bad} FAILED" if bad else ""))
+    return "\n".join(lines)
+
+
+def number(value: float) -> str:
+    """A number with seven digits."""
+    return f"{value:.7g}" if math.isfinite(value) else "none"
