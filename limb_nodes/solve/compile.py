@@ -20,7 +20,7 @@ from limb_nodes.solve.generate import program
 
 IMPORTS = (
     "from limb_nodes.solve.chain import acceleration, bias_slopes, impact, reaction, substitute\n"
-    "from limb_nodes.solve.pointer import SIGNATURE\n\n\n"
+    "from limb_nodes.solve.pointer import Callback\n\n\n"
 )
 
 

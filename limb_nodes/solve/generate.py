@@ -507,7 +507,7 @@ def program(layout: Layout, entries: str) -> str:
     }
     lines = [f"{name} = {value}" for name, value in constants.items()]
     lines += [f"{name} = {value!r}" for name, value in sorted(equations.constants.items())]
-    head = "import math\n\nimport numpy as np\nfrom numba import carray, cfunc, njit\n\n"
+    head = "import math\n\nimport numpy as np\nfrom numba import carray, njit\n\n"
     return head + "\n".join(lines) + "\n\n\n" + "\n\n".join([*equations.texts, *texts, entries])
 
 

@@ -81,6 +81,22 @@ def take_step(method, rates, t, h, y, stages, slopes, p, k, u, c, stage_y, new_y
         explicit_step(rates, t, h, y, stages, p, k, u, c, stage_y, new_y)
 
 
+@njit(types.void(i8, vector, vector, integers, table, vector, vector, table), cache=True, error_model="numpy")
+def difference_slopes(rates, y, p, k, u, c, scale, out):
+    """Slopes of the rates at time 0, out [states, states], by central differences."""
+    n = y.size
+    moved, low, high = y.copy(), np.empty(n), np.empty(n)
+    for j in range(n):
+        change = 1e-6 * scale[j]
+        moved[j] = y[j] - change
+        call(rates, 0.0, moved, p, k, u, c, low)
+        moved[j] = y[j] + change
+        call(rates, 0.0, moved, p, k, u, c, high)
+        moved[j] = y[j]
+        for i in range(n):
+            out[i, j] = (high[i] - low[i]) / (2.0 * change)
+
+
 SIGNATURE = types.int64(
     i8,
     i8,

@@ -6,8 +6,12 @@ their types anew at every call, which costs more than a whole tick.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
 from llvmlite import ir
-from numba import types
+from numba import cfunc, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
@@ -15,6 +19,23 @@ f8, i8 = types.float64, types.int64
 numbers, whole_numbers = types.CPointer(f8), types.CPointer(i8)
 # t, y, parameters, index, input, rows of input, context, result
 SIGNATURE = types.void(f8, numbers, numbers, whole_numbers, numbers, i8, numbers, numbers)
+
+
+class Callback:
+    """A function of a program that is compiled when its address is first asked for."""
+
+    def __init__(self, function: Callable[..., None]) -> None:
+        self.function = function
+
+    @cached_property
+    def compiled(self) -> Any:
+        """The compiled function, kept on disk between processes."""
+        return cfunc(SIGNATURE, cache=True, error_model="numpy")(self.function)
+
+    @property
+    def address(self) -> int:
+        """Where the compiled function is."""
+        return int(self.compiled.address)
 
 
 @intrinsic

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from types import ModuleType
 
 import numpy as np
@@ -18,6 +19,7 @@ from limb_nodes.solve.integrate import (
     NOT_FINITE,
     STEP_TOO_SMALL,
     TOO_MANY_STEPS,
+    difference_slopes,
     integrate,
 )
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
@@ -25,6 +27,7 @@ from limb_nodes.solve.pieces import corners, pieces
 
 ANGLE_SCALE, VELOCITY_SCALE = 1.0, 10.0
 TOLERANCE = 1e-9
+LONGEST_STEP = 0.1
 METHODS = {"explicit": EXPLICIT, "implicit": IMPLICIT}
 # Rate (1/s) from which steps that accuracy allows would be unstable with the explicit method.
 STIFF = 2000.0
@@ -108,10 +111,27 @@ class WholeModel:
         return out[: size * size].reshape(size, size)
 
     def stiffness(self) -> float:
-        """Fastest rate (1/s) of the limb at its start with all muscles fully excited."""
-        slopes = self.slopes(self.initial_state(), np.ones(self.layout.muscles))
+        """Fastest rate (1/s) of the limb at its start with all muscles fully excited.
+
+        By differences: the program of the exact slopes need not be compiled to find that it is not
+        needed.
+        """
+        state, layout = self.initial_state(), self.layout
+        slopes = np.empty((state.size, state.size))
+        inputs = pieces(self.drives(np.ones((1, layout.muscles))))
+        difference_slopes(
+            self.program.rates_c.address,
+            state,
+            layout.parameters,
+            layout.index,
+            inputs,
+            self.context(0.0, 1.0),
+            self.state_scale,
+            slopes,
+        )
         return float(np.abs(np.linalg.eigvals(slopes)).max())
 
+    @cached_property
     def suited_method(self) -> int:
         """The implicit method where stability would hold the explicit one to small steps."""
         return IMPLICIT if self.stiffness() > STIFF else EXPLICIT
@@ -138,83 +158,29 @@ class WholeModel:
             is smooth between samples, but for corners (`limb_nodes.solve.pieces`).
         tolerance: of the local error, relative to the state or its typical size.
         method: "explicit", "implicit", or "auto", which chooses by `stiffness`.
-        observe: whether to fill in what muscles and motor units show.
+        observe: whether to fill in accelerations and what muscles and motor units show; where not,
+            those have no rows.
         Raises SolveError where the equations cannot be solved further.
         """
-        count = len(excitation)
         period = 1.0 / rate
-        times: FloatArray = np.arange(count, dtype=np.float64) * period
+        times: FloatArray = np.arange(len(excitation), dtype=np.float64) * period
         samples = self.drives(excitation)
-        u = pieces(samples)
-        y = self.initial_state()
-        out = np.empty((count, y.size))
-        c = self.context(0.0, period)
-        progress = np.zeros(4)
-        chosen = METHODS[method] if method in METHODS else self.suited_method()
-        layout, program = self.layout, self.program
-        status = integrate(
-            chosen,
-            program.rates_c.address,
-            program.jacobian_c.address,
-            program.reactions_c.address,
-            program.strike_c.address,
-            0.0,
-            times[-1],
-            y,
-            times,
-            out,
-            self.state_scale,
-            layout.parameters,
-            layout.index,
-            u,
-            c,
-            layout.joints,
-            self.limit_offset,
-            program.LOCKED,
-            kinks(samples, period),
-            tolerance,
-            0.1,
-            progress,
-        )
-        if status != DONE:
-            raise SolveError(f"{self.limb.file}: the solution stops at {progress[2]:.6g} s: {FAILURES[status]}")
-        return self.movement(times, out, excitation, u, c, progress, observe)
-
-    def movement(
-        self,
-        times: FloatArray,
-        states: FloatArray,
-        excitation: FloatArray,
-        u: FloatArray,
-        c: FloatArray,
-        progress: FloatArray,
-        observe: bool,
-    ) -> Movement:
-        """Accelerations and outputs of solved states."""
-        layout, program = self.layout, self.program
-        n, count = layout.joints, len(times)
-        acceleration = np.empty((count, n))
-        limits = layout.parameters[self.limit_offset : self.limit_offset + 2 * n]
-        program.accelerations(
-            times,
-            states,
-            layout.parameters,
-            layout.index,
-            u,
-            c,
-            limits[:n],
-            limits[n:],
-            acceleration,
-        )
-        muscle = np.zeros((count, layout.muscles, len(MUSCLE_OUTPUTS)))
-        unit = np.zeros((count, layout.units, len(UNIT_OUTPUTS)))
-        if observe and layout.muscles:
-            program.observe_all(
+        inputs = pieces(samples)
+        context = self.context(0.0, period)
+        states, steps = self.solve(times, inputs, kinks(samples, period), context, tolerance, METHODS.get(method))
+        n, layout = self.layout.joints, self.layout
+        shown = len(times) if observe else 0
+        acceleration = np.empty((shown, n))
+        muscle = np.zeros((shown, layout.muscles, len(MUSCLE_OUTPUTS)))
+        unit = np.zeros((shown, layout.units, len(UNIT_OUTPUTS)))
+        if observe:
+            self.accelerations(times, states, inputs, context, acceleration)
+            self.program.observe_all(
                 states,
                 np.ascontiguousarray(excitation, dtype=np.float64),
                 layout.parameters,
                 layout.index,
-                c,
+                context,
                 muscle,
                 unit,
             )
@@ -228,7 +194,64 @@ class WholeModel:
             excitation=excitation,
             muscle={name: muscle[:, :, i] for i, name in enumerate(MUSCLE_OUTPUTS)},
             unit={name: unit[:, :, i] for i, name in enumerate(UNIT_OUTPUTS)},
-            steps=(int(progress[0]), int(progress[1])),
+            steps=steps,
+        )
+
+    def solve(
+        self,
+        times: FloatArray,
+        inputs: FloatArray,
+        stops: FloatArray,
+        context: FloatArray,
+        tolerance: float,
+        method: int | None,
+    ) -> tuple[FloatArray, tuple[int, int]]:
+        """States [T, states] at given times, and the accepted and rejected steps.
+
+        inputs: pieces of the drives. stops: times of corners. method: None chooses by `stiffness`.
+        Raises SolveError.
+        """
+        state = self.initial_state()
+        out = np.empty((len(times), state.size))
+        progress = np.zeros(4)
+        chosen = self.suited_method if method is None else method
+        layout, program = self.layout, self.program
+        status = integrate(
+            chosen,
+            program.rates_c.address,
+            program.jacobian_c.address if chosen == IMPLICIT else 0,
+            program.reactions_c.address,
+            program.strike_c.address,
+            times[0],
+            times[-1],
+            state,
+            times,
+            out,
+            self.state_scale,
+            layout.parameters,
+            layout.index,
+            inputs,
+            context,
+            layout.joints,
+            self.limit_offset,
+            program.LOCKED,
+            stops,
+            tolerance,
+            LONGEST_STEP,
+            progress,
+        )
+        if status != DONE:
+            raise SolveError(f"{self.limb.file}: the solution stops at {progress[2]:.6g} s: {FAILURES[status]}")
+        return out, (int(progress[0]), int(progress[1]))
+
+    def accelerations(
+        self, times: FloatArray, states: FloatArray, inputs: FloatArray, context: FloatArray, out: FloatArray
+    ) -> None:
+        """Fill in joint accelerations out [T, n] of solved states."""
+        layout, n = self.layout, self.layout.joints
+        limits = layout.parameters[self.limit_offset : self.limit_offset + 2 * n]
+        self.program.accelerations(
+            times, states, layout.parameters, layout.index, inputs, context, limits[:n], limits[n:], out
         )
 
 
