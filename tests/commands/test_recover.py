@@ -25,21 +25,21 @@ def whole(tmp_path: Path) -> Path:
 def test_a_bag_cut_short_becomes_readable(whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     cut = tmp_path / "cut"
     cut.mkdir()
-    data = (whole / "whole.mcap").read_bytes()
-    (cut / "cut.mcap").write_bytes(data[: len(data) // 2])
+    # Without the last bytes of the end, whatever messages the writer put into which chunk.
+    (cut / "cut.mcap").write_bytes((whole / "whole.mcap").read_bytes()[:-20])
     out = tmp_path / "out"
     assert main(["plot", str(cut), "-o", str(tmp_path / "a.png")]) == 2
     assert f"limb recover {cut}" in capsys.readouterr().err
     assert main(["recover", str(cut), "-o", str(out)]) == 0
     with BagReader(out) as bag:
         table = bag.table("activation")
-    np.testing.assert_array_equal(table["tick"], np.arange(len(table["tick"])))
+    np.testing.assert_array_equal(table["tick"], np.arange(500))
     lines = capsys.readouterr().out.splitlines()
     assert lines == [
-        f"/activation  {len(table['tick'])} messages",
+        "/activation  500 messages",
         "/run_info    1 message",
         "the file is damaged or ends within a record; what came after that place is lost",
-        f"bag {out}, up to {table['time'][-1]:g} s",
+        f"bag {out}, up to 0.499 s",
     ]
 
 
