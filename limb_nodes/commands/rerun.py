@@ -7,8 +7,11 @@ import shlex
 import sys
 import tempfile
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+from limb_nodes.commands import run as run_command
+from limb_nodes.commands import simulate
 from limb_nodes.errors import UserError
 
 
@@ -27,7 +30,6 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Unpack limb and laws, then call the command that made the bag."""
     from limb_nodes.bags.read import BagReader
-    from limb_nodes.cli import main
 
     with BagReader(args.bag) as bag:
         info = bag.run_info()
@@ -42,7 +44,8 @@ def run(args: argparse.Namespace) -> int:
         given = [*shared, "--out", args.out]
         settings = info["parameters"]
         if "simulate" in settings:
-            return main(["simulate", *given, "--tolerance", repr(float(settings["simulate"]["tolerance"]))])
+            given += ["--tolerance", repr(float(settings["simulate"]["tolerance"]))]
+            return call(simulate, ["simulate", *given])
         stack = settings.get("muscle_stack", {})
         given += ["--state-every", str(stack.get("state_every", 1))]
         if not stack.get("publish_muscle_state", True):
@@ -50,7 +53,14 @@ def run(args: argparse.Namespace) -> int:
         if args.processes:
             given.append("--processes")
         print(f"again      {info.get('command') or shlex.join(['limb', *sys.argv[1:]])}")
-        return main(["run", *given])
+        return call(run_command, ["run", *given])
+
+
+def call(command: ModuleType, given: list[str]) -> int:
+    """Run another command with arguments as a person would give them."""
+    parser = argparse.ArgumentParser()
+    command.add_parser(parser.add_subparsers())
+    return int(command.run(parser.parse_args(given)))
 
 
 def unpack(folder: Path, info: dict[str, Any]) -> Path:
