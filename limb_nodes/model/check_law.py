@@ -71,7 +71,8 @@ class Same:
 
     def __init__(self, chosen: ChosenLaw) -> None:
         self.chosen = chosen
-        self.key = (chosen.law, chosen.module, tuple(sorted(chosen.values.items())))
+        law = chosen.law
+        self.key = (law, tuple(law.ranges.items()), chosen.module, tuple(sorted(chosen.values.items())))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Same) and self.key == other.key

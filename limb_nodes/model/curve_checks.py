@@ -84,6 +84,6 @@ def kink_fault(name: str, variable: str, curve: Callable[[float], float], scale:
     at_zero = place(variable, 0.0) + suffix
     if gap > KINK * step * steepest + 1e-9 * abs(middle):
         return f"{name} jumps from {values[0]:.4g} over {middle:.4g} to {values[1]:.4g} at {at_zero}"
-    if abs(slopes[1] - slopes[0]) > KINK * steepest:
+    if abs(slopes[1] - slopes[0]) > KINK * steepest + 1e-14 * abs(middle) / step:
         return f"{name} has a kink at {at_zero}: its slope is {slopes[0]:.4g} below and {slopes[1]:.4g} above"
     return ""
