@@ -11,7 +11,8 @@ A law of a process
    functions of `math`, and other functions of the same kind; no loops, containers or side
    effects. Such code runs interpreted, compiled and differentiated alike;
 5. may bring states; it then defines the rate of each;
-6. keeps the properties under `properties`, which are checked when a limb is loaded.
+6. keeps the properties under `properties`, which are checked when a limb is loaded, over the law's
+   `ranges` where it declares them; a law with states has finite rates there.
 """
 
 from __future__ import annotations
@@ -122,6 +123,7 @@ CONTRACTS: dict[str, Contract] = {
             ("excitation",),
             ("activation",),
             "none",
+            ("rises with the excitation and is not negative, where the law has no states",),
         ),
         Contract(
             "path",
@@ -130,6 +132,7 @@ CONTRACTS: dict[str, Contract] = {
             ("joint_angle", "joint_velocity", "role"),
             ("muscle_tendon_length", "muscle_tendon_velocity", "moment_arm"),
             "constant_moment_arm",
+            ("the velocity is the rate at which the length shortens", "the length is positive"),
         ),
         Contract(
             "tendon",
@@ -138,6 +141,7 @@ CONTRACTS: dict[str, Contract] = {
             ("tendon_force", "tendon_length"),
             ("tendon_velocity",),
             "voigt",
+            ("with a state: falls with the length, rises with the pull",),
             absent="rigid",
         ),
         Contract(
@@ -152,6 +156,7 @@ CONTRACTS: dict[str, Contract] = {
                 "muscle_force",
             ),
             "constant_area",
+            ("muscle force and fibre velocity rise with the force of the fibres", "the muscle force is not negative"),
             absent="none",
         ),
     )
