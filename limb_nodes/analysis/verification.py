@@ -1,7 +1,8 @@
 """The verification of the report's section 3.3 as data: limbs, what drives them, and what they must show.
 
-The expected numbers follow from mechanics and statics alone (period of a pendulum by an elliptic integral, equilibria
-by balance of torques, turning points by energy), never from the solvers that are verified.
+The expected numbers never come from the solvers that are verified: the period of a pendulum is an elliptic integral,
+equilibria balance torques, a pendulum turns where its energy says, and the other courses are solved by scipy with
+equations that the test of this module writes down again.
 """
 
 from __future__ import annotations
