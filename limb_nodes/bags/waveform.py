@@ -182,7 +182,7 @@ def sample_waveforms(
                 "a number in [0, 1] is needed, or clip: true"
             )
         columns.append(values)
-    return np.stack(columns, axis=1)
+    return np.stack(columns, axis=1) if columns else np.empty((len(times), 0))
 
 
 def _waveform(section: Section) -> Waveform:
