@@ -6,6 +6,8 @@ Differential Equations I, II.5 and II.6.
 
 from __future__ import annotations
 
+import math
+
 from numba import njit
 
 from limb_nodes.solve.pointer import call
@@ -67,8 +69,9 @@ def error_norm(h, y, new_y, stages, scale, tolerance):
         )
         size = max(scale[i], abs(y[i]), abs(new_y[i]))
         ratio = abs(error) / (tolerance * size)
-        if not ratio <= worst:
-            worst = ratio
+        if not math.isfinite(ratio):
+            return ratio
+        worst = max(worst, ratio)
     return worst
 
 

@@ -6,6 +6,8 @@ and IV.10. It is L-stable: fast decaying motion does not limit the step.
 
 from __future__ import annotations
 
+import math
+
 from numba import njit
 
 from limb_nodes.solve.pointer import call
@@ -121,8 +123,9 @@ def error_norm(y, new_y, stages, scale, tolerance):
     worst = 0.0
     for i in range(y.size):
         ratio = abs(stages[5, i]) / (tolerance * max(scale[i], abs(y[i]), abs(new_y[i])))
-        if not ratio <= worst:
-            worst = ratio
+        if not math.isfinite(ratio):
+            return ratio
+        worst = max(worst, ratio)
     return worst
 
 
