@@ -82,6 +82,11 @@ class Layout:
                 count = size if node == Nodetype.ARRAY else self._length()
                 self._sequence(element_node, element, count, field)
 
+    @property
+    def end(self) -> int:
+        """How many bytes of the data the fields walked through take."""
+        return self._at
+
     def _nested(self, msgtype: str, field: str) -> None:
         if msgtype == "std_msgs/msg/Header":
             # Its stamp is the bag's time; frame_id may be any text but takes the same room.

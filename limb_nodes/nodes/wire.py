@@ -38,6 +38,8 @@ class Outgoing:
         self._data = bytearray(serialize_message(example))
         layout = Layout(bytes(self._data), limb_typestore())
         layout.message(type_name(type(example)), "")
+        # What rclpy appends is no part of the message, and readers of bags refuse it.
+        del self._data[layout.end :]
         self._stamp = np.frombuffer(self._data, dtype="<u4", count=2, offset=STAMP.start)
         self.values = {
             name: np.frombuffer(
