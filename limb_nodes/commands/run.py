@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 import sys
 from typing import Any
@@ -42,8 +43,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.duration is not None and not args.duration > 0.0:
         raise UserError(f"--duration is {args.duration:g}; a number > 0 in s is needed")
-    if args.state_every < 1:
-        raise UserError(f"--state-every is {args.state_every}; a whole number >= 1 is needed")
+    if not 1 <= args.state_every <= 1_000_000:
+        raise UserError(f"--state-every is {args.state_every}; a whole number from 1 to 1000000 is needed")
     wanted = Run(
         limb=args.limb,
         source=args.activation,
@@ -65,6 +66,9 @@ def run(args: argparse.Namespace) -> int:
             bar.update(max(0, tick + 1 - bar.n))
 
         outcome = (run_in_processes if args.processes else run_in_one_process)(ready, show)
+    if outcome.interrupted and not os.path.exists(ready.out):
+        print("interrupted before anything was recorded")
+        return 130
     seconds = (outcome.ticks - 1) / args.rate if outcome.ticks else 0.0
     print(f"ticks      {outcome.ticks} at {args.rate:g} Hz ({seconds:g} s)")
     print(f"missing    {outcome.missing}")

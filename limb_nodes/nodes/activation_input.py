@@ -44,19 +44,25 @@ class ActivationInput(LimbNode):
                 "constants are needed (live input needs mode realtime)"
             )
         else:
+            if 0.0 < duration < self.ticks.period:
+                raise UserError(
+                    f"activation_input: the parameter duration is {duration:g}; 0, or at least one tick of "
+                    f"{self.ticks.period:g} s is needed"
+                )
             self.final = round(duration * self.ticks.rate) if duration else None
-            self.create_subscription(MuscleActivation, "emg_envelope", self.on_envelope, LIVE)
+        self.envelopes: Any = None
         self.newest = np.zeros(len(self.muscles))
         self.sent = -1
         example = MuscleActivation(name=self.muscles, activation=[0.0] * len(self.muscles))
         publisher = self.create_publisher(MuscleActivation, "activation", STREAM)
         self.activation = Outgoing(publisher, example, self.ticks.nanoseconds)
         self.joint_states = Incoming(JointState, "name", self.ticks.nanoseconds)
-        self.create_subscription(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
+        self.listen(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
 
     def on_envelope(self, message: MuscleActivation) -> None:
         """Take over a live envelope where every value is good."""
-        given = dict(zip(message.name, message.activation, strict=False))
+        whole = len(message.name) == len(message.activation)
+        given = dict(zip(message.name, message.activation, strict=True)) if whole else {}
         values = np.array([given.get(name, np.nan) for name in self.muscles])
         good = (values >= 0.0) & (values <= 1.0)
         if good.all():
@@ -68,10 +74,15 @@ class ActivationInput(LimbNode):
 
     def on_joint_states(self, data: bytes) -> None:
         """Send what the tick of the message and the next one need."""
-        last = self.joint_states.read(data) + 1
+        now = self.joint_states.read(data)
+        if self.source is None and self.envelopes is None and now > 0:
+            # Not before the limb moves, so that who waits for a listener starts together with the limb.
+            self.envelopes = self.listen(MuscleActivation, "emg_envelope", self.on_envelope, LIVE)
+        last = now + 1
         if self.final is not None and last >= self.final:
             last = self.final
-            self.finished = True
+            # Only the final tick itself tells that muscle_stack has taken all activations before it.
+            self.finished = now >= self.final
         for tick in range(self.sent + 1, last + 1):
             values = self.activation.values
             values["activation"][:] = self.newest if self.source is None else self.source.values[tick]

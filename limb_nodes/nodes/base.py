@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Header
 
 from limb_nodes.errors import UserError
 from limb_nodes.model import Limb, load_limb
+from limb_nodes.nodes.qos import LIVE
 from limb_nodes.nodes.ticks import Ticks
 
 MODES = ("lockstep", "realtime")
@@ -21,14 +27,19 @@ FAREWELL = "at the end of the run"
 class LimbNode(Node):
     """A node of one limb at one rate.
 
-    finished: whether the node has done its part of the run.
+    finished: whether the node has done its part of the run. failure: why it cannot go on, for whoever spins
+    it; a text, because an error would keep the node and all that it knows alive. bad_input: messages that
+    could not be used.
     """
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
         self.finished = False
+        self.failure = ""
         self.bad_input = 0
         self._last_complaint = -math.inf
+        self._told = 0
+        self.diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", LIVE)
         path = self.text("limb", "", "the limb's YAML file")
         if not path:
             raise UserError(f"{name}: the parameter limb is empty; the path of a limb's YAML file is needed")
@@ -52,7 +63,16 @@ class LimbNode(Node):
         """A parameter that holds a number within a range."""
         span = FloatingPointRange(from_value=lowest, to_value=highest)
         descriptor = ParameterDescriptor(description=meaning, read_only=True, floating_point_range=[span])
-        return float(self._declare(name, default, descriptor, f"a number from {lowest:g} to {highest:g}"))
+        given = self._parameter_overrides.get(name)
+        if given is not None and given.type_ == Parameter.Type.INTEGER:
+            # ROS tells 200 from 200.0; a person does not.
+            self._parameter_overrides[name] = Parameter(name, value=float(given.value))
+        value = float(self._declare(name, default, descriptor, f"a number from {lowest:g} to {highest:g}"))
+        if not lowest <= value <= highest:
+            raise UserError(
+                f"{self.get_name()}: {name} is {value:g}; a number from {lowest:g} to {highest:g} is needed"
+            )
+        return value
 
     def whole(self, name: str, default: int, meaning: str, lowest: int, highest: int) -> int:
         """A parameter that holds a whole number within a range."""
@@ -76,10 +96,41 @@ class LimbNode(Node):
     def complain(self, what: str) -> None:
         """Count a message that cannot be used, and say so once per second at most."""
         self.bad_input += 1
-        now = self.get_clock().now().nanoseconds * 1e-9
+        now = time.monotonic()
         if now - self._last_complaint >= 1.0:
             self._last_complaint = now
             self.get_logger().warning(f"{what}; kept the last good value ({self.bad_input} so far)")
+            self.diagnose(what, bad=True)
+
+    def diagnose(self, message: str, bad: bool, **values: object) -> None:
+        """Publish on `/diagnostics` how the node does."""
+        self._told = self.bad_input
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if bad else DiagnosticStatus.OK,
+            name=self.get_fully_qualified_name(),
+            message=message,
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()]
+            + [KeyValue(key="bad_input", value=str(self.bad_input))],
+        )
+        stamp = self.get_clock().now().to_msg()
+        self.diagnostics.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
+
+    def listen(self, kind: type, topic: str, callback: Callable[[Any], None], qos: QoSProfile, **options: Any) -> Any:
+        """Subscribe a topic; what the callback cannot do ends the node, in one line."""
+
+        def guarded(message: Any) -> None:
+            try:
+                callback(message)
+            except UserError as error:
+                self.failure = self.failure or str(error)
+
+        return self.create_subscription(kind, topic, guarded, qos, **options)
+
+    def destroy_node(self) -> None:
+        """Tell the last count of bad input."""
+        if self.bad_input > self._told:
+            self.diagnose(f"{self.bad_input} messages could not be used", bad=True)
+        super().destroy_node()
 
 
 def finite(*fields: Sequence[float]) -> bool:

@@ -7,13 +7,13 @@ from collections import OrderedDict
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, WrenchStamped
 from limb_msgs.msg import JointTorque, MovementPattern
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header, Int64, String
+from std_msgs.msg import Int64, String
 
+from limb_nodes.errors import UserError
 from limb_nodes.model.points import point_names, points
 from limb_nodes.nodes.base import LimbNode, finite
 from limb_nodes.nodes.qos import LATCHED, LIVE, RECORDER_LAG, STREAM
@@ -55,13 +55,12 @@ class LimbDynamics(LimbNode):
         self.last_tick: int | None = None
         self.joint_states, self.pattern = self.messages()
         self.torque = Incoming(JointTorque, "joint", self.ticks.nanoseconds)
-        self.diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", LIVE)
         self.description = self.create_publisher(String, "robot_description", LATCHED)
         self.description.publish(String(data=urdf(self.limb)))
-        self.create_subscription(JointTorque, "joint_torque", self.on_torque, STREAM, raw=True)
-        self.create_subscription(WrenchStamped, "external_load", self.on_load, LIVE)
+        self.listen(JointTorque, "joint_torque", self.on_torque, STREAM, raw=True)
+        self.listen(WrenchStamped, "external_load", self.on_load, LIVE)
         if self.awaits_recorder:
-            self.create_subscription(Int64, "recorder_progress", self.on_recorded, LATCHED)
+            self.listen(Int64, "recorder_progress", self.on_recorded, LATCHED)
         else:
             self.offer()
         if self.mode == "realtime":
@@ -143,19 +142,25 @@ class LimbDynamics(LimbNode):
         self.step(rows)
 
     def on_timer(self) -> None:
+        """Step as far as the wall clock has gone; what cannot be solved ends the node, in one line."""
+        try:
+            self.catch_up()
+        except UserError as error:
+            self.failure = self.failure or str(error)
+
+    def catch_up(self) -> None:
         """Step as far as the wall clock has gone, with the newest torque."""
         now = time.monotonic()
         if self.newest is None or self.finished:
             return
         if self.started_at is None:
             self.started_at = now - self.ticks.period
-        due = int((now - self.started_at) / self.ticks.period + 0.1)
-        if due > self.tick + 1:
-            self.missed += due - self.tick - 1
+        due = int((now - self.started_at) / self.ticks.period + 0.5)
         while self.tick < due and not self.finished:
             tick, rows = self.newest
+            # Each tick that came too late, or without its own torque, is one missed deadline.
+            self.missed += self.tick + 1 < due or tick != self.tick
             if tick != self.tick:
-                self.missed += 1
                 rows = self.carried(tick, rows)
             self.step(rows)
         if now - self.last_report >= REPORT_PERIOD:
@@ -177,11 +182,13 @@ class LimbDynamics(LimbNode):
 
     def step(self, rows: np.ndarray) -> None:
         """Publish the movement pattern of this tick and go on to the next."""
+        # In real time the limb may have gone on before it heard which tick is the last.
+        self.finished = self.last_tick is not None and self.tick >= self.last_tick
+        if self.finished and self.mode == "realtime":
+            # Before the message with which the recording ends.
+            self.report()
         self.publish_pattern(self.stepper.acceleration(rows))
-        if self.tick == self.last_tick:
-            self.finished = True
-            if self.mode == "realtime":
-                self.report()
+        if self.finished:
             return
         if self.mode == "realtime":
             self.history[self.tick] = self.stepper.angle.copy(), self.stepper.velocity.copy()
@@ -201,21 +208,10 @@ class LimbDynamics(LimbNode):
 
     def report(self) -> None:
         """Publish how real time is kept."""
-        level = DiagnosticStatus.WARN if self.missed else DiagnosticStatus.OK
-        status = DiagnosticStatus(
-            level=level,
-            name=self.get_fully_qualified_name(),
-            message=f"{self.missed} missed deadlines in {self.tick} ticks",
-            values=[
-                KeyValue(key="ticks", value=str(self.tick)),
-                KeyValue(key="missed_deadlines", value=str(self.missed)),
-                KeyValue(key="bad_input", value=str(self.bad_input)),
-            ],
-        )
-        stamp = self.get_clock().now().to_msg()
-        self.diagnostics.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
+        message = f"{self.missed} missed deadlines in {self.tick} ticks"
+        self.diagnose(message, bad=bool(self.missed), ticks=self.tick, missed_deadlines=self.missed)
         if self.missed:
-            self.get_logger().warning(status.message, throttle_duration_sec=1.0)
+            self.get_logger().warning(message, throttle_duration_sec=1.0)
 
 
 main = main_of(LimbDynamics)

@@ -51,8 +51,8 @@ class MuscleStack(LimbNode):
         self.states = self.state_topics()
         self.activation = Incoming(MuscleActivation, "name", nanoseconds)
         self.joint_states = Incoming(JointState, "name", nanoseconds)
-        self.create_subscription(MuscleActivation, "activation", self.on_activation, STREAM, raw=True)
-        self.create_subscription(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
+        self.listen(MuscleActivation, "activation", self.on_activation, STREAM, raw=True)
+        self.listen(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
 
     def state_topics(self) -> list[tuple[Outgoing, list[tuple[np.ndarray, np.ndarray]]]]:
         """The topics of states that are switched on: messages, and pairs of what to copy where."""
@@ -166,11 +166,13 @@ class MuscleStack(LimbNode):
 
 
 def in_order(message: Incoming, field: str, names: list[str]) -> np.ndarray:
-    """Numbers of a message in the order of `names`, NaN for those that it lacks."""
+    """Numbers of a message in the order of `names`, NaN for those that it lacks, or all where it is malformed."""
     values = message[field]
-    if message.names == names and len(values) == len(names):
+    if len(values) != len(message.names):
+        return np.full(len(names), np.nan)
+    if message.names == names:
         return values.astype(np.float64)
-    given = dict(zip(message.names, values, strict=False))
+    given = dict(zip(message.names, values, strict=True))
     return np.array([given.get(name, np.nan) for name in names])
 
 

@@ -78,17 +78,19 @@ class Recorder(LimbNode):
         self.first_message: float | None = None
         self.progress = self.create_publisher(Int64, "recorder_progress", LATCHED)
         for topic, kind in TICKED.items():
-            self.create_subscription(kind, topic, partial(self.on_tick, topic), STREAM, raw=True)
+            self.listen(kind, topic, partial(self.on_tick, topic), STREAM, raw=True)
         for topic, kind in OTHERS.items():
-            self.create_subscription(kind, topic, partial(self.on_other, topic), LIVE, raw=True)
+            self.listen(kind, topic, partial(self.on_other, topic), LIVE, raw=True)
         self.description: str | None = None
-        self.create_subscription(String, "robot_description", self.on_description, LATCHED)
+        self.listen(String, "robot_description", self.on_description, LATCHED)
         self.asking = self.create_timer(0.05, self.ask)
 
     def on_description(self, message: String) -> None:
-        """Keep the robot description for the bag."""
+        """Write the robot description, or keep it until the bag is open."""
         if self.description is None:
             self.description = message.data
+            if self.writer is not None:
+                self.write("robot_description", 0, message)
 
     def ask(self) -> None:
         """Ask the other nodes for their parameters until all have told them; then open the bag."""
@@ -103,7 +105,10 @@ class Recorder(LimbNode):
         waited = self.first_message is not None and time.monotonic() - self.first_message > PATIENCE
         if set(self.parameters) >= set(NODES) or waited:
             self.asking.cancel()
-            self.open()
+            try:
+                self.open()
+            except UserError as error:
+                self.failure = str(error)
 
     def on_names(self, node: str, client: AsyncParameterClient, future: Any) -> None:
         """Ask for the values of a node's parameters."""
@@ -183,7 +188,9 @@ class Recorder(LimbNode):
         """Publish the newest tick that is there on every topic."""
         if self.writer is None:
             return
-        complete = min(self.newest[topic] + every - 1 for topic, every in self.expected.items())
+        complete = min(
+            self.newest[topic] + every - 1 if self.newest[topic] >= 0 else -1 for topic, every in self.expected.items()
+        )
         if self.last_tick is not None and complete >= self.last_tick:
             self.finished = True
         if complete > self.announced:
@@ -197,11 +204,13 @@ class Recorder(LimbNode):
 
     def destroy_node(self) -> None:
         """Close the bag, so that it is readable however the run ended."""
-        if self.writer is None and self.buffer:
-            self.open()
-        if self.writer is not None:
-            self.writer.close()
-        super().destroy_node()
+        try:
+            if self.writer is None and self.buffer and not self.failure:
+                self.open()
+            if self.writer is not None:
+                self.writer.close()
+        finally:
+            super().destroy_node()
 
 
 def is_last(data: bytes) -> bool:

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
 import rclpy
 from rclpy.context import Context
+from rclpy.exceptions import InvalidNamespaceException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.validate_namespace import validate_namespace
 
 from limb_nodes.errors import UserError
 
 # The executor is asked for one event at a time with a time-out: without one it hangs when idle.
 SPIN_TIMEOUT = 0.05
+# The variable by which a run tells the nodes in processes of their own whose children they are: they end with it.
+PARENT = "LIMB_RUN_PARENT"
 
 
 def make_executor(context: Context) -> Executor:
@@ -35,6 +41,18 @@ def spin(executor: Executor, done: Callable[[], bool]) -> None:
     with suppress(ExternalShutdownException):
         while not done():
             executor.spin_once(timeout_sec=SPIN_TIMEOUT)
+
+
+def check_namespace(namespace: str) -> None:
+    """Raise UserError where ROS would not have a namespace."""
+    full = namespace if namespace.startswith("/") else f"/{namespace}"
+    try:
+        validate_namespace(full)
+    except InvalidNamespaceException:
+        raise UserError(
+            f"--namespace is {namespace!r}; words of letters, digits and _, none with a digit in front, "
+            "with / between them are needed"
+        ) from None
 
 
 class Interrupt:
@@ -62,7 +80,7 @@ def run_node(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
     """Run one node until it has finished or is interrupted; its exit status."""
     interrupt = Interrupt()
     context = Context()
-    node = None
+    node, executor = None, None
     try:
         rclpy.init(args=args, context=context, signal_handler_options=SignalHandlerOptions.NO)
         node = node_class(context=context)
@@ -71,7 +89,11 @@ def run_node(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
         # What exists now stays: collecting it again and again would cost ticks.
         gc.collect()
         gc.freeze()
-        spin(executor, lambda: interrupt.wanted or node.finished)
+        parent = os.environ.get(PARENT)
+        orphaned = (lambda: str(os.getppid()) != parent) if parent else (lambda: False)
+        spin(executor, lambda: interrupt.wanted or node.finished or bool(node.failure) or orphaned())
+        if node.failure:
+            raise UserError(node.failure)
         if not interrupt.wanted:
             linger(executor, node, interrupt)
         return 0
@@ -81,19 +103,27 @@ def run_node(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
     except KeyboardInterrupt:
         return 0
     finally:
-        if node is not None:
+        close(context, executor, [node] if node is not None else [])
+
+
+def close(context: Context, executor: Executor | None, nodes: Iterable[Node]) -> None:
+    """Destroy nodes, so that they leave the graph at once, and end what belongs to them."""
+    try:
+        for node in nodes:
+            if executor is not None:
+                executor.remove_node(node)
             node.destroy_node()
+    finally:
         with suppress(Exception):
             rclpy.shutdown(context=context)
 
 
 def linger(executor: Executor, node: Any, interrupt: Interrupt) -> None:
     """Stay until everybody who listens has taken the last messages, 5 s at most."""
-    clock = node.get_clock()
-    end = clock.now().nanoseconds + 5_000_000_000
+    end = time.monotonic() + 5.0
     publishers = [p for p in node.publishers if p.get_subscription_count() > 0]
     for publisher in publishers:
-        while not interrupt.wanted and clock.now().nanoseconds < end:
+        while not interrupt.wanted and time.monotonic() < end:
             if acknowledged(publisher):
                 break
             executor.spin_once(timeout_sec=SPIN_TIMEOUT)

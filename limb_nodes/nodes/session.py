@@ -6,9 +6,10 @@ import gc
 import os
 import subprocess
 import sys
+import threading
 import time
+from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ from limb_nodes.nodes.limb_dynamics import LimbDynamics
 from limb_nodes.nodes.muscle_stack import MuscleStack
 from limb_nodes.nodes.qos import LATCHED
 from limb_nodes.nodes.recorder import Recorder
-from limb_nodes.nodes.running import Interrupt, make_executor
+from limb_nodes.nodes.running import PARENT, Interrupt, check_namespace, close, make_executor
 
 CLASSES = {
     "activation_input": ActivationInput,
@@ -36,6 +37,11 @@ CLASSES = {
 }
 STARTING = 60.0
 ENDING = 10.0
+# How long other nodes of the domain may take to be found (s).
+DISCOVERY = 0.5
+ERROR = "limb: error: "
+# Longest run (s).
+LONGEST = 1e9
 
 
 @dataclass(frozen=True)
@@ -97,9 +103,10 @@ def run_in_one_process(run: Run, progress: Progress) -> Outcome:
     interrupt = Interrupt()
     context = Context()
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    executor = make_executor(context)
     nodes: dict[str, Any] = {}
     try:
-        executor = make_executor(context)
+        refuse_neighbours(context, run.namespace)
         for name in NODES:
             overrides = [Parameter(key, value=value) for key, value in run.parameters(name).items()]
             nodes[name] = CLASSES[name](context=context, parameter_overrides=overrides, namespace=run.namespace or None)
@@ -117,6 +124,9 @@ def run_in_one_process(run: Run, progress: Progress) -> Outcome:
                 shown = recorder.announced
                 progress(shown)
                 refuse_company(dynamics)
+            for node in nodes.values():
+                if node.failure:
+                    raise UserError(node.failure)
         ended = time.monotonic()
         return Outcome(
             ticks=recorder.counts["joint_states"],
@@ -127,10 +137,8 @@ def run_in_one_process(run: Run, progress: Progress) -> Outcome:
             interrupted=interrupt.wanted,
         )
     finally:
-        for node in nodes.values():
-            node.destroy_node()
-        with suppress(Exception):
-            rclpy.shutdown(context=context)
+        close(context, executor, nodes.values())
+        gc.unfreeze()
 
 
 def refuse_company(node: Any) -> None:
@@ -152,80 +160,121 @@ def run_in_processes(run: Run, progress: Progress) -> Outcome:
     observer.create_subscription(
         Int64, "recorder_progress", lambda message: recorded.update(tick=message.data), LATCHED
     )
-    children: dict[str, subprocess.Popen[str]] = {}
+    executor = make_executor(context)
+    children: dict[str, Child] = {}
     try:
-        executor = make_executor(context)
+        refuse_neighbours(context, run.namespace)
         executor.add_node(observer)
         for name in NODES:
-            children[name] = start(run, name)
+            children[name] = Child(run, name)
         begun = time.monotonic()
         started = None
-        while children["recorder"].poll() is None and not interrupt.wanted:
+        while children["recorder"].status is None and not interrupt.wanted:
             executor.spin_once(timeout_sec=0.05)
             progress(recorded["tick"])
             refuse_company(observer)
             if started is None and recorded["tick"] > 0:
                 started = time.monotonic()
-            for name, child in children.items():
-                if child.poll() not in (None, 0):
+            for child in children.values():
+                if child.status not in (None, 0):
                     stop(children)
-                    raise UserError(complaint(name, child))
+                    raise UserError(child.complaint())
             if started is None and time.monotonic() - begun > STARTING:
                 raise UserError(f"the nodes did not start within {STARTING:g} s; is another run using the same topics?")
         ended = time.monotonic()
         stop(children)
-        status = children["recorder"].returncode
-        if status != 0:
-            raise UserError(complaint("recorder", children["recorder"]))
+        if interrupt.wanted and not Path(run.out).exists():
+            return Outcome(0, 0, 0, 0, 0.0, True)
+        if children["recorder"].status != 0:
+            raise UserError(children["recorder"].complaint())
         return recorded_outcome(run, ended - (started or ended), interrupt.wanted)
     finally:
         stop(children)
-        observer.destroy_node()
-        with suppress(Exception):
-            rclpy.shutdown(context=context)
+        close(context, executor, [observer])
 
 
-def start(run: Run, name: str) -> subprocess.Popen[str]:
-    """Start one node."""
-    arguments = ["--ros-args"]
-    if run.namespace:
-        arguments += ["-r", f"__ns:={run.namespace}"]
-    for key, value in run.parameters(name).items():
-        text = str(value).lower() if isinstance(value, bool) else value
-        # Quoted, so that a text such as 'yes' or '1' stays a text.
-        given = "'" + str(value).replace("'", "''") + "'" if isinstance(value, str) else text
-        arguments += ["-p", f"{key}:={given}"]
-    return subprocess.Popen(
-        [sys.executable, "-m", f"limb_nodes.nodes.{name}", *arguments],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stdin=subprocess.DEVNULL,
-        text=True,
-        # Ctrl-C goes to this process alone, which then ends the others in order.
-        start_new_session=True,
-        env=os.environ.copy(),
-    )
+class Child:
+    """A node in a process of its own. What it says goes on to standard error; its errors are kept."""
+
+    def __init__(self, run: Run, name: str) -> None:
+        self.name = name
+        self.said: deque[str] = deque(maxlen=20)
+        arguments = ["--ros-args"]
+        if run.namespace:
+            arguments += ["-r", f"__ns:={'' if run.namespace.startswith('/') else '/'}{run.namespace}"]
+        for key, value in run.parameters(name).items():
+            text = str(value).lower() if isinstance(value, bool) else value
+            # Quoted, so that a text such as 'yes' or '1' stays a text.
+            given = "'" + str(value).replace("'", "''") + "'" if isinstance(value, str) else text
+            arguments += ["-p", f"{key}:={given}"]
+        self.handle = subprocess.Popen(
+            [sys.executable, "-m", f"limb_nodes.nodes.{name}", *arguments],
+            stderr=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stdin=subprocess.DEVNULL,
+            text=True,
+            errors="replace",
+            # Ctrl-C goes to this process alone, which then ends the others in order.
+            start_new_session=True,
+            env={**os.environ, PARENT: str(os.getpid())},
+        )
+        # Read all the time: a child whose pipe is full would stand still.
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
+
+    def _read(self) -> None:
+        assert self.handle.stderr is not None
+        for line in self.handle.stderr:
+            self.said.append(line.rstrip("\n"))
+            if not line.startswith(ERROR):
+                print(line, end="", file=sys.stderr)
+
+    @property
+    def status(self) -> int | None:
+        """The exit status, None while it runs."""
+        return self.handle.poll()
+
+    def end(self) -> None:
+        """End it by its own handle."""
+        if self.status is None:
+            self.handle.terminate()
+            try:
+                self.handle.wait(ENDING)
+            except subprocess.TimeoutExpired:
+                self.handle.kill()
+                self.handle.wait()
+        self.reader.join(ENDING)
+
+    def complaint(self) -> str:
+        """What a node that failed has said."""
+        self.reader.join(ENDING)
+        lines = [line.removeprefix(ERROR) for line in self.said if line.startswith(ERROR)]
+        return lines[-1] if lines else f"the node {self.name} ended with status {self.status}"
 
 
-def stop(children: dict[str, subprocess.Popen[str]]) -> None:
-    """End all nodes, the recorder last, each by its own handle."""
+def stop(children: dict[str, Child]) -> None:
+    """End all nodes, the recorder last."""
     for name in ("activation_input", "limb_dynamics", "muscle_stack", "recorder"):
-        child = children.get(name)
-        if child is None or child.poll() is not None:
-            continue
-        child.terminate()
-        try:
-            child.wait(ENDING)
-        except subprocess.TimeoutExpired:
-            child.kill()
-            child.wait()
+        if name in children:
+            children[name].end()
 
 
-def complaint(name: str, child: subprocess.Popen[str]) -> str:
-    """What a node that failed has said."""
-    said = child.stderr.read().strip().splitlines() if child.stderr else []
-    lines = [line.removeprefix("limb: error: ") for line in said if line.startswith("limb: error: ")]
-    return lines[-1] if lines else f"{name} ended with status {child.returncode}: {said[-1] if said else 'no message'}"
+def refuse_neighbours(context: Context, namespace: str) -> None:
+    """Raise UserError where nodes of another run use the same topics: each would take the other's messages."""
+    full = f"/{namespace.strip('/')}"
+    probe = rclpy.create_node("limb_run_probe", context=context, namespace=full, start_parameter_services=False)
+    try:
+        end = time.monotonic() + DISCOVERY
+        while time.monotonic() < end:
+            for name, where in probe.get_node_names_and_namespaces():
+                if name in NODES and where == full:
+                    raise UserError(
+                        f"a node {name} runs already in namespace {full}, perhaps of another run; give --namespace, "
+                        "or set ROS_DOMAIN_ID, to another one"
+                    )
+            time.sleep(0.02)
+    finally:
+        probe.destroy_node()
 
 
 def recorded_outcome(run: Run, seconds: float, interrupted: bool) -> Outcome:
@@ -239,14 +288,17 @@ def recorded_outcome(run: Run, seconds: float, interrupted: bool) -> Outcome:
         for topic in expected:
             every = run.state_every if topic in run.states else 1
             missing += max(0, -(-ticks // every) - bag.count(topic))
-        missed, bad_input = 0, 0
+        missed, bad_input = 0, dict.fromkeys(NODES, 0)
         if bag.has("/diagnostics"):
+            nodes = {f"/{run.namespace.strip('/')}/{name}".replace("//", "/"): name for name in NODES}
             for _, message in bag.read_topic("/diagnostics"):
                 for status in message.status:
-                    values = {pair.key: pair.value for pair in status.values}
-                    missed = int(values.get("missed_deadlines", missed))
-                    bad_input = int(values.get("bad_input", bad_input))
-    return Outcome(ticks, missing, missed, bad_input, seconds, interrupted)
+                    if status.name in nodes:
+                        values = {pair.key: int(pair.value) for pair in status.values}
+                        missed = max(missed, values.get("missed_deadlines", 0))
+                        name = nodes[status.name]
+                        bad_input[name] = max(bad_input[name], values.get("bad_input", 0))
+    return Outcome(ticks, missing, missed, sum(bad_input.values()), seconds, interrupted)
 
 
 def checked(run: Run) -> tuple[Run, int | None]:
@@ -258,7 +310,12 @@ def checked(run: Run) -> tuple[Run, int | None]:
 
     limb = load_limb(run.limb)
     Ticks(run.rate)
+    check_namespace(run.namespace)
     refuse_existing(Path(run.out))
+    if run.duration and not 1 / run.rate <= run.duration <= LONGEST:
+        raise UserError(
+            f"--duration is {run.duration:g}; a number from {1 / run.rate:g}, one tick, to {LONGEST:g} in s is needed"
+        )
     final = round(run.duration * run.rate) if run.duration else None
     if run.source:
         activation = load_activation(run.source, limb.muscle_names, run.rate, run.duration or None)
