@@ -1,0 +1,219 @@
+"""Nodes among strangers: what cannot be used is kept out, counted, and said once per second at most."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
+from limb_msgs.msg import JointTorque, MuscleActivation
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from limb_nodes.bags.read import BagReader
+from limb_nodes.nodes.activation_input import ActivationInput
+from limb_nodes.nodes.limb_dynamics import LimbDynamics
+from limb_nodes.nodes.muscle_stack import MuscleStack
+from limb_nodes.nodes.qos import LIVE, STREAM
+from limb_nodes.nodes.recorder import Recorder
+from limb_nodes.nodes.ticks import Ticks
+
+NAN, INF = float("nan"), float("inf")
+RATE = 200.0
+TICKS = Ticks(RATE)
+MUSCLES, JOINTS = ["flexor", "extensor"], ["joint"]
+
+BAD_ACTIVATIONS = {
+    "NaN": {"activation": [NAN, 0.5]},
+    "infinite": {"activation": [0.5, INF]},
+    "negative": {"activation": [-0.1, 0.5]},
+    "above 1": {"activation": [0.5, 1.5]},
+    "a muscle missing": {"name": ["flexor"], "activation": [0.5]},
+    "other muscles": {"name": ["left", "right"], "activation": [0.5, 0.5]},
+    "a value missing": {"activation": [0.5]},
+    "no value": {"activation": []},
+    "nothing": {"name": [], "activation": []},
+}
+BAD_STATES = {
+    "NaN angle": {"position": [NAN]},
+    "infinite velocity": {"velocity": [INF]},
+    "other joint": {"name": ["knee"]},
+    "no velocity": {"velocity": []},
+    "no angle": {"position": []},
+    "too many": {"position": [0.1, 0.2]},
+    "nothing": {"name": [], "position": [], "velocity": []},
+}
+BAD_TORQUES = {
+    "NaN": {"torque": [NAN]},
+    "infinite slope": {"slope_angle": [INF]},
+    "NaN slope": {"slope_time": [NAN]},
+    "other joint": {"joint": ["knee"]},
+    "ragged": {"slope_velocity": [0.0, 0.0]},
+    "a slope missing": {"slope_velocity": []},
+    "nothing": {"joint": [], "torque": [], "slope_angle": [], "slope_velocity": [], "slope_time": []},
+}
+
+
+def activation(tick: int, **fields: Any) -> MuscleActivation:
+    given = {"name": MUSCLES, "activation": [0.5, 0.5], **fields}
+    return MuscleActivation(header=Header(stamp=TICKS.stamp(tick)), tick=tick, **given)
+
+
+def states(tick: int, **fields: Any) -> JointState:
+    given = {"name": JOINTS, "position": [0.5], "velocity": [0.0], **fields}
+    return JointState(header=Header(stamp=TICKS.stamp(tick)), **given)
+
+
+def torque(tick: int, **fields: Any) -> JointTorque:
+    zeros = {key: [0.0] for key in ("torque", "slope_angle", "slope_velocity", "slope_time")}
+    return JointTorque(header=Header(stamp=TICKS.stamp(tick)), tick=tick, **{"joint": JOINTS, **zeros, **fields})
+
+
+def warnings(said: str, node: str) -> list[str]:
+    return [line for line in said.splitlines() if "[WARN]" in line and f"[{node}]" in line]
+
+
+def test_activation_input_keeps_the_last_good_envelope(bench, limb, capfd):
+    graph = bench()
+    told = graph.listen(DiagnosticArray, "/diagnostics", LIVE)
+    heard = graph.listen(MuscleActivation, "activation", STREAM)
+    node = graph.add(ActivationInput, limb=limb, mode="realtime", rate=RATE)
+    joints = graph.publisher(JointState, "joint_states", STREAM)
+    graph.until(lambda: node.diagnostics.get_subscription_count(), "who listens to diagnostics")
+    joints.publish(states(1))
+    envelope = graph.publisher(MuscleActivation, "emg_envelope", LIVE)
+    envelope.publish(activation(0, activation=[0.25, 0.75]))
+    graph.until(lambda: node.newest.tolist() == [0.25, 0.75], "the good envelope")
+    begun = time.monotonic()
+    for count, fields in enumerate([*BAD_ACTIVATIONS.values()] * 10, 1):
+        envelope.publish(activation(count, **fields))
+        graph.until(lambda count=count: node.bad_input == count, f"envelope {count} to be counted")
+    took = time.monotonic() - begun
+    joints.publish(states(7))
+    graph.until(lambda: heard and heard[-1].tick == 8, "activation 8")
+    assert list(heard[-1].activation) == [0.25, 0.75]
+    assert 1 <= len(warnings(capfd.readouterr().err, "activation_input")) <= took + 1
+    graph.until(lambda: told, "a diagnostic")
+    assert told[0].status[0].name == "/activation_input"
+    # More muscles than needed, in another order, are good.
+    envelope.publish(activation(0, name=["other", "extensor", "flexor"], activation=[NAN, 0.1, 0.2]))
+    graph.until(lambda: node.newest.tolist() == [0.2, 0.1], "the envelope of three muscles")
+    assert node.bad_input == 90
+
+
+@pytest.mark.parametrize("fields", BAD_ACTIVATIONS.values(), ids=BAD_ACTIVATIONS)
+def test_muscle_stack_keeps_the_last_good_activation(fields, bench, limb):
+    graph = bench()
+    node = graph.add(MuscleStack, limb=limb, rate=RATE, publish_muscle_state=True)
+    for message in activation(0, activation=[0.25, 0.75]), activation(1, **fields):
+        node.on_activation(serialize_message(message))
+    assert node.bad_input == 1
+    kept = node.inputs[1][0]
+    good = [0.25 <= value <= 0.75 for value in kept]
+    assert all(good), kept
+    heard = graph.listen(JointTorque, "joint_torque", STREAM)
+    joints = graph.publisher(JointState, "joint_states", STREAM)
+    joints.publish(states(0))
+    graph.until(lambda: heard, "a torque")
+    assert np.isfinite([heard[0].torque[0], heard[0].slope_time[0]]).all()
+
+
+def test_muscle_stack_waits_for_good_joint_states(bench, limb, capfd):
+    graph = bench()
+    heard = graph.listen(JointTorque, "joint_torque", STREAM)
+    node = graph.add(MuscleStack, limb=limb, rate=RATE)
+    activations = graph.publisher(MuscleActivation, "activation", STREAM)
+    joints = graph.publisher(JointState, "joint_states", STREAM)
+    for tick in range(3):
+        activations.publish(activation(tick))
+    joints.publish(states(0))
+    graph.until(lambda: [m.tick for m in heard] == [0], "torque 0")
+    for count, fields in enumerate(BAD_STATES.values(), 1):
+        joints.publish(states(1, **fields))
+        graph.until(lambda count=count: node.bad_input == count, f"joint states {count} to be counted")
+    assert [m.tick for m in heard] == [0]
+    joints.publish(states(1, name=["other", "joint"], position=[NAN, 0.5], velocity=[0.0, 0.0]))
+    graph.until(lambda: [m.tick for m in heard] == [0, 1], "torque 1")
+    assert np.isfinite(heard[1].torque[0])
+    assert 1 <= len(warnings(capfd.readouterr().err, "muscle_stack")) <= 3
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_limb_dynamics_keeps_bad_torques_out(mode, bench, limb, capfd):
+    graph = bench()
+    heard = graph.listen(JointState, "joint_states", STREAM)
+    node = graph.add(LimbDynamics, limb=limb, rate=RATE, mode=mode)
+    torques = graph.publisher(JointTorque, "joint_torque", STREAM)
+    graph.until(lambda: heard, "joint states 0")
+    for count, fields in enumerate(BAD_TORQUES.values(), 1):
+        torques.publish(torque(0, **fields))
+        graph.until(lambda count=count: node.bad_input == count, f"torque {count} to be counted")
+    assert node.tick == 0
+    torques.publish(torque(0))
+    graph.until(lambda: node.tick >= 1 and len(heard) >= 2, "joint states 1")
+    assert np.isfinite([*heard[1].position, *heard[1].velocity]).all()
+    lines = warnings(capfd.readouterr().err, "limb_dynamics")
+    assert 1 <= len([line for line in lines if "kept the last good value" in line]) <= 3
+
+
+@pytest.mark.parametrize("bad", [NAN, INF, -INF])
+def test_limb_dynamics_keeps_the_last_good_load(bad, bench, limb):
+    graph = bench()
+    node = graph.add(LimbDynamics, limb=limb, rate=RATE, await_recorder=True)
+    loads = graph.publisher(WrenchStamped, "external_load", LIVE)
+    loads.publish(load(3.0, -2.0, 0.5))
+    graph.until(lambda: node.stepper.load.tolist() == [3.0, -2.0, 0.5], "the load")
+    for count, values in enumerate(((bad, 0.0, 0.0), (0.0, bad, 0.0), (0.0, 0.0, bad)), 1):
+        loads.publish(load(*values))
+        graph.until(lambda count=count: node.bad_input == count, "a bad load to be counted")
+    assert node.stepper.load.tolist() == [3.0, -2.0, 0.5]
+
+
+def load(x: float, y: float, turning: float) -> WrenchStamped:
+    return WrenchStamped(wrench=Wrench(force=Vector3(x=x, y=y), torque=Vector3(z=turning)))
+
+
+def test_a_load_acts_as_the_limb_s_own_tip_force(bench, limb, waves, bags, tmp_path):
+    """The same movement, value for value, as with force and torque in the limb's file."""
+    text = Path(limb).read_text()
+    assert text.count("tip_force: [0.0, 0.0]") == text.count("tip_torque: 0.0") == 1
+    loaded = tmp_path / "loaded.yaml"
+    loaded.write_text(
+        text.replace("tip_force: [0.0, 0.0]", "tip_force: [3.0, -2.0]").replace("tip_torque: 0.0", "tip_torque: 0.5")
+    )
+    for name, file in ("plain", limb), ("message", limb), ("file", str(loaded)):
+        graph = bench(name)
+        common = {"limb": file, "rate": 1000.0}
+        dynamics = graph.add(LimbDynamics, await_recorder=True, **common)
+        graph.add(MuscleStack, **common)
+        graph.add(ActivationInput, source=waves, duration=0.2, **common)
+        recorder = graph.add(Recorder, out=str(tmp_path / name), **common)
+        if name == "message":
+            # Before the recorder lets the run begin: nothing is handled until the bench spins.
+            dynamics.on_load(load(3.0, -2.0, 0.5))
+        graph.until(lambda recorder=recorder: recorder.finished, "the end of the run")
+        graph.finish(recorder)
+    names = "plain", "message", "file"
+    angles = {name: bags.decoded(tmp_path / name, ("joint_states",))["joint_states"] for name in names}
+    np.testing.assert_array_equal(angles["message"]["position"], angles["file"]["position"])
+    assert np.abs(angles["message"]["position"] - angles["plain"]["position"]).max() > 0.01
+
+
+def test_a_load_is_recorded(bench, limb, tmp_path):
+    graph = bench()
+    recorder = graph.add(Recorder, limb=limb, out=str(tmp_path / "run"), rate=RATE)
+    joints = graph.publisher(JointState, "joint_states", STREAM)
+    loads = graph.publisher(WrenchStamped, "external_load", LIVE)
+    joints.publish(states(0))
+    graph.until(lambda: recorder.counts["joint_states"], "joint states")
+    loads.publish(load(3.0, -2.0, 0.5))
+    graph.until(lambda: any(topic == "external_load" for topic, *_ in recorder.buffer), "the load")
+    graph.finish(recorder)
+    with BagReader(tmp_path / "run") as bag:
+        ((_, message),) = bag.read_topic("external_load")
+    assert message.wrench.force.x == 3.0
