@@ -185,6 +185,9 @@ def test_a_muscle_cannot_push():
     assert penn.muscle_force(-5.0, 0.3, 0.1) == 0.0
     assert penn.parallel_muscle_force(-5.0) == 0.0
     assert penn.parallel_muscle_force(5.0) == 5.0
+    # A force that is not a number is not taken for none.
+    assert math.isnan(penn.muscle_force(math.nan, 0.3, 0.1))
+    assert math.isnan(penn.parallel_muscle_force(math.nan))
 
 
 def test_without_pennation_fibres_are_the_muscle():

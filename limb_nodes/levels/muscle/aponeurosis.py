@@ -65,7 +65,8 @@ def fibre_velocity(
 @equation("2.38", "muscle_force")
 def muscle_force(total_fibre_force: float, pennation_angle: float, aponeurosis_angle: float) -> float:
     """Force (N) along the line of pull; a muscle-tendon unit cannot push."""
-    return max(0.0, total_fibre_force * math.cos(pennation_angle) / math.cos(aponeurosis_angle))
+    # In this order of arguments, what is not a number stays so.
+    return max(total_fibre_force * math.cos(pennation_angle) / math.cos(aponeurosis_angle), 0.0)
 
 
 @equation("2.55", "aponeurosis_force")
@@ -108,7 +109,7 @@ def parallel_pennation_angle() -> float:
 @equation("2.38 parallel", "muscle_force")
 def parallel_muscle_force(total_fibre_force: float) -> float:
     """Force (N) along the line of pull without pennation; never below zero."""
-    return max(0.0, total_fibre_force)
+    return max(total_fibre_force, 0.0)
 
 
 none = register(

@@ -31,7 +31,7 @@ def fibre_velocity(muscle_velocity: float, pennation_angle: float) -> float:
 @equation("F_M", "muscle_force")
 def muscle_force(total_fibre_force: float, pennation_angle: float) -> float:
     """Force (N) along the line of pull; a muscle-tendon unit cannot push."""
-    return max(0.0, total_fibre_force * math.cos(pennation_angle))
+    return max(total_fibre_force * math.cos(pennation_angle), 0.0)
 
 
 constant_thickness = register(
