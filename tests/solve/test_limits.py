@@ -1,0 +1,108 @@
+"""Joint ranges of a limb with muscles, and solves that cannot go on."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from limb_nodes.solve.pieces import pieces
+from limb_nodes.solve.whole import SolveError
+
+RATE = 1000.0
+
+
+def pulse(time: np.ndarray) -> np.ndarray:
+    """The flexor pulls for half a second, then nobody does [T, 2]."""
+    return np.column_stack([np.where(time < 0.5, 1.0, 0.0), np.zeros(time.size)])
+
+
+class TestLimit:
+    """The reference joint against a limit at 0.6 rad."""
+
+    @pytest.fixture(scope="class")
+    def found(self, model_named):
+        model = model_named("reference_joint", {"segments[0].range": [-2.0, 0.6]})
+        return model.simulate(pulse(np.arange(1501) / RATE), RATE, method="explicit", tolerance=1e-11)
+
+    def test_it_stops_and_stays_while_it_is_pressed(self, found):
+        angle, velocity = found.angle[:, 0], found.velocity[:, 0]
+        first = int(np.argmax(angle == 0.6))
+        assert 0 < first < 400
+        assert (angle <= 0.6).all()
+        assert (angle[first:500] == 0.6).all()
+        assert (velocity[first:500] == 0.0).all()
+        assert (found.acceleration[first:500] == 0.0).all()
+        assert found.velocity[first - 1, 0] > 0.1
+
+    def test_it_leaves_when_it_is_pulled_back(self, found, model_named):
+        """From the instant at which the torque changes its sign, as the free limb does from rest there."""
+        last = int(np.flatnonzero(found.angle[:, 0] == 0.6)[-1])
+        assert last == 499
+        rest = model_named("reference_joint", {"segments[0].angle": 0.6})
+        # The flexor's force sinks to nothing within the last millisecond of the pulse.
+        u = pulse(np.arange(1501) / RATE)
+        torque = {t: rest.simulate(u[t : t + 2], RATE).acceleration[0, 0] for t in (499, 500)}
+        assert torque[499] > 0 > torque[500]
+        free = rest.simulate(np.zeros((601, 2)), RATE, method="explicit", tolerance=1e-11)
+        gap = found.angle[500:1101, 0] - free.angle[:, 0]
+        # The two start less than a millisecond apart.
+        assert np.abs(gap).max() < 1e-3 * np.abs(free.velocity).max() + 1e-9
+        assert found.angle[1100, 0] < 0.0
+
+    def test_instant_of_the_impact(self, found, model_named):
+        """By scipy's event location, on the free limb."""
+        model = model_named("reference_joint")
+        layout, program = model.layout, model.program
+        u, c = pieces(model.drives(np.full((2, 2), [1.0, 0.0]))), model.context(0.0, 1.0)
+
+        def rates(t, y):
+            out = np.empty(2)
+            program.rates(t, np.ascontiguousarray(y), layout.parameters, layout.index, u, c, out)
+            return out
+
+        def touch(t, y):
+            return y[0] - 0.6
+
+        touch.terminal = True
+        solved = solve_ivp(rates, (0, 1), model.initial_state(), "DOP853", events=touch, rtol=1e-12, atol=1e-13)
+        instant = solved.t_events[0][0]
+        before = int(instant * RATE)
+        assert np.flatnonzero(found.angle[:, 0] == 0.6)[0] == before + 1
+        reached = solve_ivp(rates, (0, before / RATE), model.initial_state(), "DOP853", rtol=1e-12, atol=1e-13)
+        assert found.angle[before, 0] == pytest.approx(reached.y[0, -1], abs=1e-8)
+
+    def test_a_start_on_the_limit(self, model_named):
+        still = np.zeros((301, 2))
+        held = {"segments[0].range": [0.3, 1.0], "segments[0].angle": 0.3}
+        found = model_named("reference_joint", held).simulate(still, RATE, method="explicit")
+        assert (found.angle == 0.3).all()
+        falling = {"segments[0].range": [-1.0, 0.3], "segments[0].angle": 0.3}
+        found = model_named("reference_joint", falling).simulate(still, RATE, method="explicit")
+        free = model_named("reference_joint", {"segments[0].angle": 0.3}).simulate(still, RATE, method="explicit")
+        np.testing.assert_allclose(found.angle, free.angle, atol=1e-9)
+        np.testing.assert_allclose(found.acceleration[1:], free.acceleration[1:], atol=1e-6)
+        thrown = {**held, "segments[0].velocity": -3.0}
+        found = model_named("reference_joint", thrown).simulate(still, RATE, method="explicit")
+        assert (found.angle == 0.3).all()
+        assert (found.velocity[1:] == 0.0).all()
+
+    def test_explicit_and_implicit_meet_the_same_limits(self, model_named, waves):
+        model = model_named("reference_joint_tendon", {"segments[0].range": [-0.1, 0.25], "segments[0].angle": 0.1})
+        excitation = waves(np.arange(1501) / RATE, 2)
+        one, two = (model.simulate(excitation, RATE, method=method) for method in ("explicit", "implicit"))
+        assert (one.angle == -0.1).any() or (one.angle == 0.25).any()
+        np.testing.assert_allclose(one.angle, two.angle, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["reference_joint", "reference_joint_tendon"])
+@pytest.mark.parametrize("muscle", [0, 1])
+def test_an_excitation_that_is_not_a_number_ends_the_solve(name, muscle, model_named):
+    excitation = np.full((101, 2), 0.9)
+    excitation[40:, muscle] = np.nan
+    with pytest.raises(SolveError, match=r"yaml: the solution stops at 0\.03\d* s: a rate is not"):
+        model_named(name).simulate(excitation, RATE, method="explicit")
+
+
+def test_a_load_beyond_all_measure_ends_the_solve(model_named):
+    model = model_named("reference_joint", {"tip_force": [1e300, 1e300]})
+    with pytest.raises(SolveError, match="the solution stops at"):
+        model.simulate(np.zeros((11, 2)), RATE, method="explicit")
