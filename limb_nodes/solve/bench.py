@@ -21,6 +21,7 @@ from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.layout import FloatArray, build_layout
 from limb_nodes.model.limb import Limb, Muscle, Segment
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.pieces import straight
 from limb_nodes.solve.stepping import MuscleStepper
 from limb_nodes.solve.whole import SolveError, WholeModel
 
@@ -249,13 +250,14 @@ class MuscleBench:
         if not state.size:
             return state
         drive = self.model.drives(np.array([[excitation]]))
+        held_drive = straight(drive[0], drive[0])
         scale = layout.state_scales
         c = self.model.context(0.0, 1.0)
         c[program.CUBIC : program.TORQUE] = [length, 0.0, length, 0.0]
 
         def rates(x: FloatArray) -> FloatArray:
             out = np.zeros_like(x)
-            program.muscle_rates(0.0, x, layout.parameters, layout.index, drive, c, out)
+            program.muscle_rates(0.0, x, layout.parameters, layout.index, held_drive, c, out)
             return out / scale
 
         held = np.array([length]), np.zeros(1)
