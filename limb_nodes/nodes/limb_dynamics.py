@@ -20,6 +20,7 @@ from limb_nodes.nodes.qos import LATCHED, LIVE, RECORDER_LAG, STREAM
 from limb_nodes.nodes.running import main_of
 from limb_nodes.nodes.urdf import urdf
 from limb_nodes.nodes.wire import Incoming, Outgoing
+from limb_nodes.solve.small import finite as sound
 from limb_nodes.solve.stepping import LimbStepper
 
 TORQUE_FIELDS = ("torque", "slope_angle", "slope_velocity", "slope_time")
@@ -125,7 +126,7 @@ class LimbDynamics(LimbNode):
             rows[:] = fields
         else:
             rows[:] = np.nan
-        if not np.isfinite(rows).all():
+        if not sound(rows.reshape(-1)):
             self.complain(f"joint_torque of tick {tick}: finite numbers for {', '.join(self.joints)} needed")
             return
         if message.flag("last"):

@@ -19,6 +19,7 @@ from limb_nodes.solve.outputs import (
     UNIT_FIELDS,
     UNIT_OUTPUTS,
 )
+from limb_nodes.solve.small import finite, within_unit
 from limb_nodes.solve.stepping import MuscleStepper
 
 
@@ -95,8 +96,8 @@ class MuscleStack(LimbNode):
         if tick <= self.tick or tick in self.inputs:
             return
         values = in_order(message, "activation", self.muscles)
-        good = (values >= 0.0) & (values <= 1.0)
-        if not good.all():
+        if not within_unit(values):
+            good = (values >= 0.0) & (values <= 1.0)
             name = self.muscles[int(np.flatnonzero(~good)[0])]
             self.complain(f"activation of tick {tick}: {name} is not a number from 0 to 1")
             values = np.where(good, values, self.excitation)
@@ -116,7 +117,7 @@ class MuscleStack(LimbNode):
             return
         angle = in_order(message, "position", self.limb.joint_names)
         velocity = in_order(message, "velocity", self.limb.joint_names)
-        if not (np.isfinite(angle).all() and np.isfinite(velocity).all()):
+        if not (finite(angle) and finite(velocity)):
             self.complain(
                 f"joint_states of tick {tick}: finite angles and velocities of "
                 f"{', '.join(self.limb.joint_names)} are needed"

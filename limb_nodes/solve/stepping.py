@@ -16,6 +16,7 @@ from limb_nodes.model.limb import Limb
 from limb_nodes.solve.integrate import DONE, EXPLICIT, integrate
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import bent, straight
+from limb_nodes.solve.small import hold, predict, same
 from limb_nodes.solve.whole import FAILURES, SolveError, WholeModel
 
 TICK_TOLERANCE = 1e-9
@@ -171,7 +172,9 @@ class LimbStepper:
         self._rates = np.empty(2 * n)
         self._torque = np.zeros((7, n))
         self._progress = np.zeros(4)
-        self._predicted: FloatArray | None = None
+        # What the last step expects of the next torque; empty where it says nothing.
+        self._expected: FloatArray = np.empty(n)
+        self._predicted = NO_TIMES
 
     @property
     def angle(self) -> FloatArray:
@@ -190,7 +193,7 @@ class LimbStepper:
 
     def acceleration(self, torque: FloatArray) -> FloatArray:
         """Joint accelerations [n] (rad/s^2) at the current tick under rows of torque [4, n]."""
-        self._hold(torque)
+        hold(torque, self._state, NO_TIMES, 1.0, self._torque)
         program, layout = self.model.program, self.model.layout
         program.limb_rates(
             0.0,
@@ -205,11 +208,10 @@ class LimbStepper:
 
     def step(self, torque: FloatArray, period: float) -> None:
         """Advance by `period` (s) under torque and slopes [4, n]. Raises SolveError."""
-        self._hold(torque)
-        if self._predicted is not None:
-            self._torque[6] = (torque[0] - self._predicted) / (period * period)
-        held = self._context[self.model.program.LOCKED :][: self.joints].copy()
+        hold(torque, self._state, self._predicted, period, self._torque)
         program, layout, n = self.model.program, self.model.layout, self.joints
+        locked = self._context[program.LOCKED : program.LOCKED + n]
+        held = locked.copy()
         self._progress[:3] = 0.0
         self._progress[3] = period
         status = integrate(
@@ -238,28 +240,18 @@ class LimbStepper:
         )
         if status != DONE:
             raise SolveError(f"{self.model.limb.file}: the limb cannot be advanced: {FAILURES[status]}")
-        self._predict(period, struck=bool(np.any(self._context[program.LOCKED :][:n] != held)))
-
-    def _predict(self, period: float, struck: bool) -> None:
-        """Keep what the linear model says of the torque at the new tick.
-
-        An impact bends the torque at once, which tells nothing about the tick that follows.
-        """
-        row, n = self._torque, self.joints
-        self._predicted = None
-        if not struck:
-            change = self._state[:n] - row[4], self._state[n:] - row[5]
-            self._predicted = row[0] + row[1] * change[0] + row[2] * change[1] + row[3] * period
-
-    def _hold(self, torque: FloatArray) -> None:
-        self._torque[:4] = torque
-        self._torque[4] = self._state[: self.joints]
-        self._torque[5] = self._state[self.joints :]
-        self._torque[6] = 0.0
+        # An impact bends the torque at once, which tells nothing about the tick that follows.
+        if same(locked, held):
+            predict(self._torque, self._state, period, self._expected)
+            self._predicted = self._expected
+        else:
+            self._predicted = NO_TIMES
 
 
 def interval(last_drive: FloatArray | None, drive: FloatArray, next_drive: FloatArray) -> FloatArray:
     """The input over one tick."""
     if last_drive is None:
-        return straight(drive, next_drive)
-    return bent(last_drive, drive, next_drive)
+        found: FloatArray = straight(drive, next_drive)
+    else:
+        found = bent(last_drive, drive, next_drive)
+    return found
