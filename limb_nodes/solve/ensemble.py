@@ -1,0 +1,299 @@
+"""Many samples of one limb: other numbers, the same input, solved in threads or on a cluster."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import islice
+from typing import Any, TypeVar
+from uuid import uuid4
+
+import numpy as np
+
+from limb_nodes.errors import UserError
+from limb_nodes.model.layout import FloatArray
+from limb_nodes.model.limb import Limb
+from limb_nodes.model.load import build_limb
+from limb_nodes.solve.pieces import pieces
+from limb_nodes.solve.variants import Values, Variants
+from limb_nodes.solve.whole import METHODS, TOLERANCE, Movement, WholeModel, kinks
+
+Samples = Iterable[Values] | Mapping[str, FloatArray]
+Task = TypeVar("Task")
+Found = TypeVar("Found")
+# Samples or chunks that are under way or wait to be taken, per thread: they bound the memory.
+AHEAD = 4
+# Samples that travel to a worker of a cluster at once.
+CHUNK = 20
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The movement of one sample at T instants, n joints.
+
+    time: s [T]. angle, velocity: rad, rad/s [T, n]. internal: internal states [T, states].
+    steps: accepted and rejected steps of the integrator.
+    """
+
+    time: FloatArray
+    angle: FloatArray
+    velocity: FloatArray
+    internal: FloatArray
+    steps: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is done with every sample, as plain data that can travel."""
+
+    content: dict[str, Any]
+    file: str
+    text: str
+    excitation: FloatArray
+    rate: float
+    times: FloatArray | None
+    function: Callable[[Movement], Any] | None
+    tolerance: float
+    method: str
+
+    def limb(self) -> Limb:
+        """The limb of all samples."""
+        return build_limb(self.content, self.file, self.text)
+
+
+class Ensemble:
+    """Solves samples one by one; its methods may be called from several threads."""
+
+    def __init__(self, order: Order, limb: Limb) -> None:
+        self.order = order
+        self.variants = Variants(limb)
+        self.period = 1.0 / order.rate
+        asked = np.arange(len(order.excitation)) * self.period if order.times is None else order.times
+        # The solution starts with the input, whether its start is asked for or not.
+        self.early = bool(asked[0] > 0.0)
+        self.times: FloatArray = np.concatenate([[0.0], asked]) if self.early else np.ascontiguousarray(asked)
+        self.inputs = self.prepared(self.variants.base)
+        # One method for all: to find how stiff a limb is takes a part of the time of solving it.
+        self.method = METHODS.get(order.method, self.variants.base.suited_method)
+
+    def prepared(self, model: WholeModel) -> tuple[FloatArray, FloatArray]:
+        """The input as pieces, and the times of its corners."""
+        drives = model.drives(self.order.excitation)
+        return pieces(drives), kinks(drives, self.period)
+
+    def solve(self, values: Values) -> Any:
+        """What is asked of a sample, or the exception that kept it from being solved."""
+        try:
+            model = self.variants.model(values)
+            order = self.order
+            if order.function is not None:
+                method = next(name for name, number in METHODS.items() if number == self.method)
+                return order.function(
+                    model.simulate(order.excitation, order.rate, tolerance=order.tolerance, method=method)
+                )
+            same = self.variants.same_drives(model)
+            inputs, stops = self.inputs if same else self.prepared(model)
+            context = model.context(0.0, self.period)
+            states, steps = model.solve(self.times, inputs, stops, context, order.tolerance, self.method)
+            n, first = model.layout.joints, int(self.early)
+            kept = states[first:]
+            return Solution(self.times[first:], kept[:, :n], kept[:, n : 2 * n], kept[:, 2 * n :], steps)
+        except Exception as problem:
+            return problem
+
+
+def simulate_ensemble(
+    limb: Limb,
+    samples: Samples,
+    excitation: FloatArray,
+    rate: float,
+    *,
+    times: FloatArray | None = None,
+    function: Callable[[Movement], Any] | None = None,
+    tolerance: float = TOLERANCE,
+    method: str = "auto",
+    threads: int | None = None,
+    client: Any = None,
+    ordered: bool = True,
+) -> Iterator[tuple[int, Any]]:
+    """Solve a limb with the numbers of many samples; yields (index of the sample, result).
+
+    samples: one mapping of places to values each, as for `with_values`, from any iterable, which is
+        read as results are taken; or one mapping of places to arrays [N].
+    excitation: [T, muscles], sampled at `rate` Hz from t = 0, of all samples.
+    times: s, rising, within the input, at which a `Solution` is given; default: every input sample.
+    function: called with the `Movement` of a sample, all outputs filled in; its result then takes
+        the place of the `Solution`. On a cluster it must be picklable.
+    tolerance, method: as for `WholeModel.simulate`; "auto" chooses for the limb itself, and all samples follow.
+    threads: default: one per core of this process. client: a `dask.distributed.Client`, whose
+        workers then do the work; they need this package and the limb's own laws at the same place.
+    ordered: whether results come in the order of the samples or as they are there.
+
+    A sample that cannot be built or solved, or whose `function` raises, gives its exception as its
+    result and leaves the others alone. Few samples are under way at a time, whatever their number.
+
+    The numbers of a sample are checked against the ranges that their parameters declare, and a
+    muscle's lengths against its joint; curves of laws are examined for the limb itself alone,
+    unless a sample changes more than single numbers.
+    """
+    excitation = np.ascontiguousarray(excitation, dtype=np.float64)
+    refuse(limb, excitation, rate, times, function, method, threads)
+    asked = None if times is None else np.array(times, dtype=np.float64)
+    order = Order(limb.content, limb.file, limb.text, excitation, rate, asked, function, tolerance, method)
+    numbered = enumerate(one_by_one(limb, samples))
+    if client is not None:
+        return on_cluster(client, order, numbered, ordered)
+    ensemble = Ensemble(order, limb)
+    return in_threads(ensemble.solve, numbered, threads or cores(), ordered)
+
+
+def refuse(
+    limb: Limb,
+    excitation: FloatArray,
+    rate: float,
+    times: FloatArray | None,
+    function: Callable[[Movement], Any] | None,
+    method: str,
+    threads: int | None,
+) -> None:
+    """Refuse what no sample can be solved with."""
+    muscles = len(limb.muscles)
+    if excitation.ndim != 2 or len(excitation) < 2 or excitation.shape[1] != muscles:
+        raise UserError(f"{limb.file}: excitation has the shape {excitation.shape}; [two or more, {muscles}] is needed")
+    if not rate > 0.0:
+        raise UserError(f"{limb.file}: rate is {rate:g}; a number > 0 in Hz is needed")
+    if method != "auto" and method not in METHODS:
+        raise UserError(f"{limb.file}: method is {method!r}; allowed: auto, {', '.join(METHODS)}")
+    if threads is not None and threads < 1:
+        raise UserError(f"{limb.file}: threads is {threads}; an integer >= 1 is needed")
+    if times is None:
+        return
+    if function is not None:
+        raise UserError(f"{limb.file}: times and function are both given; a function gets every input sample")
+    end = (len(excitation) - 1) / rate
+    given = np.asarray(times, dtype=np.float64)
+    rising = given.ndim == 1 and given.size > 0 and bool((np.diff(given) > 0.0).all())
+    if not (rising and given[0] >= 0.0 and given[-1] <= end * (1.0 + 1e-12)):
+        raise UserError(f"{limb.file}: times must rise from 0 at the earliest to the input's end, {end:g} s")
+
+
+def one_by_one(limb: Limb, samples: Samples) -> Iterator[Values]:
+    """Samples as mappings of places to values."""
+    if not isinstance(samples, Mapping):
+        yield from samples
+        return
+    columns = {place: np.asarray(column) for place, column in samples.items()}
+    if len({column.shape[:1] for column in columns.values()}) > 1 or any(c.ndim == 0 for c in columns.values()):
+        lengths = ", ".join(f"{place} {column.shape}" for place, column in columns.items())
+        raise UserError(f"{limb.file}: arrays of samples differ in length: {lengths}")
+    for row in zip(*columns.values(), strict=True):
+        yield {place: value.tolist() for place, value in zip(columns, row, strict=True)}
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def in_threads(
+    work: Callable[[Values], Any], numbered: Iterable[tuple[int, Values]], threads: int, ordered: bool
+) -> Iterator[tuple[int, Any]]:
+    """Results of samples from this process's threads."""
+    with ThreadPoolExecutor(threads) as pool:
+
+        def begin(task: tuple[int, Values]) -> Future[tuple[int, Any]]:
+            return pool.submit(lambda: (task[0], work(task[1])))
+
+        def first(running: deque[Future[tuple[int, Any]]]) -> Future[tuple[int, Any]]:
+            return next(iter(wait(running, return_when=FIRST_COMPLETED).done))
+
+        try:
+            for future in flow(numbered, begin, AHEAD * threads, None if ordered else first):
+                yield future.result()
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def flow(
+    tasks: Iterable[Task],
+    begin: Callable[[Task], Found],
+    ahead: int,
+    first: Callable[[deque[Found]], Found] | None,
+) -> Iterator[Found]:
+    """Begin tasks, at most `ahead` before the one that is taken next.
+
+    first: picks the next of those that run; None takes them in their order.
+    """
+    source = iter(tasks)
+    running: deque[Found] = deque()
+    while True:
+        running.extend(begin(task) for task in islice(source, ahead - len(running)))
+        if not running:
+            return
+        chosen = running[0] if first is None else first(running)
+        running.remove(chosen)
+        yield chosen
+
+
+@lru_cache(maxsize=4)
+def ensemble_of(token: str, holder: OrderHolder) -> Ensemble:
+    """An ensemble that a worker keeps from chunk to chunk."""
+    return Ensemble(holder.order, holder.order.limb())
+
+
+class OrderHolder:
+    """An order that counts as equal to any other, for a cache that goes by its token."""
+
+    def __init__(self, order: Order) -> None:
+        self.order = order
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, OrderHolder)
+
+    def __hash__(self) -> int:
+        return 0
+
+
+def solve_chunk(token: str, order: Order, chunk: list[tuple[int, Values]]) -> list[tuple[int, Any]]:
+    """What a worker of a cluster does."""
+    try:
+        ensemble = ensemble_of(token, OrderHolder(order))
+    except Exception as problem:
+        return [(index, problem) for index, _ in chunk]
+    return [(index, ensemble.solve(values)) for index, values in chunk]
+
+
+def on_cluster(
+    client: Any, order: Order, numbered: Iterable[tuple[int, Values]], ordered: bool
+) -> Iterator[tuple[int, Any]]:
+    """Results of samples from the workers of a Dask cluster."""
+    from distributed import wait as wait_for
+
+    token = uuid4().hex
+    [shared] = client.scatter([order], broadcast=True, hash=False)
+    tasks = iter(numbered)
+    chunks = iter(lambda: list(islice(tasks, CHUNK)), [])
+    indices: dict[str, list[int]] = {}
+
+    def begin(chunk: list[tuple[int, Values]]) -> Any:
+        future = client.submit(solve_chunk, token, shared, chunk, pure=False)
+        indices[future.key] = [index for index, _ in chunk]
+        return future
+
+    def first(running: deque[Any]) -> Any:
+        return next(iter(wait_for(list(running), return_when="FIRST_COMPLETED").done))
+
+    running = sum(client.nthreads().values()) or 1
+    for future in flow(chunks, begin, AHEAD * running, None if ordered else first):
+        numbers = indices.pop(future.key)
+        try:
+            found = future.result()
+        except Exception as problem:
+            # A worker that died, say: the others go on.
+            found = [(index, problem) for index in numbers]
+        future.release()
+        yield from found
