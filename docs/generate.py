@@ -257,6 +257,8 @@ def node_tables() -> tuple[str, str]:
                 given |= {"out": f"{folder}/bag"} if name == "recorder" else {}
                 overrides = [RosParameter(key, value=value) for key, value in given.items()]
                 made.append(node_class(context=context, parameter_overrides=overrides))
+            # Which a live activation_input does by itself once the limb moves.
+            made[list(CLASSES).index("activation_input")].hear_envelopes()
             return topic_table(made), "\n\n".join(node_section(node, made) for node in made)
         finally:
             LimbNode._declare = declare

@@ -59,6 +59,10 @@ class ActivationInput(LimbNode):
         self.joint_states = Incoming(JointState, "name", self.ticks.nanoseconds)
         self.listen(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
 
+    def hear_envelopes(self) -> None:
+        """Subscribe the live envelopes."""
+        self.envelopes = self.listen(MuscleActivation, "emg_envelope", self.on_envelope, LIVE)
+
     def on_envelope(self, message: MuscleActivation) -> None:
         """Take over a live envelope where every value is good."""
         whole = len(message.name) == len(message.activation)
@@ -77,7 +81,7 @@ class ActivationInput(LimbNode):
         now = self.joint_states.read(data)
         if self.source is None and self.envelopes is None and now > 0:
             # Not before the limb moves, so that who waits for a listener starts together with the limb.
-            self.envelopes = self.listen(MuscleActivation, "emg_envelope", self.on_envelope, LIVE)
+            self.hear_envelopes()
         last = now + 1
         if self.final is not None and last >= self.final:
             last = self.final

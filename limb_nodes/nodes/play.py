@@ -18,7 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.errors import UserError
-from limb_nodes.nodes.qos import LIVE
+from limb_nodes.nodes.qos import EVERY
 from limb_nodes.nodes.running import Interrupt, acknowledged, check_namespace
 
 TOPIC = "emg_envelope"
@@ -91,7 +91,7 @@ def play(
     node = None
     try:
         node = Node("play", context=context, namespace=namespace or None, start_parameter_services=False)
-        publisher = node.create_publisher(MuscleActivation, TOPIC, LIVE)
+        publisher = node.create_publisher(MuscleActivation, TOPIC, EVERY)
         if wait:
             await_listener(node, publisher, wait, interrupt)
         start = time.monotonic()

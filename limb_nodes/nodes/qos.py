@@ -27,3 +27,10 @@ LIVE = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.VOLATILE,
 )
+# As LIVE, for those who want every message: they may fall behind for a while.
+EVERY = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=HISTORY,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+)

@@ -29,7 +29,7 @@ from limb_nodes.bags.write import BagWriter, refuse_existing
 from limb_nodes.errors import UserError
 from limb_nodes.model import user_sources
 from limb_nodes.nodes.base import NODES, LimbNode
-from limb_nodes.nodes.qos import LATCHED, LIVE, STREAM
+from limb_nodes.nodes.qos import EVERY, LATCHED, STREAM
 from limb_nodes.nodes.running import main_of
 from limb_nodes.nodes.ticks import SECOND
 
@@ -80,7 +80,7 @@ class Recorder(LimbNode):
         for topic, kind in TICKED.items():
             self.listen(kind, topic, partial(self.on_tick, topic), STREAM, raw=True)
         for topic, kind in OTHERS.items():
-            self.listen(kind, topic, partial(self.on_other, topic), LIVE, raw=True)
+            self.listen(kind, topic, partial(self.on_other, topic), EVERY, raw=True)
         self.description: str | None = None
         self.listen(String, "robot_description", self.on_description, LATCHED)
         self.asking = self.create_timer(0.05, self.ask)

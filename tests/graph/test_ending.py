@@ -43,8 +43,11 @@ def whole(bag: Path, bags) -> int:
     return min(len(columns["stamp"]) for columns in found.values())
 
 
-@pytest.mark.parametrize("options", [[], ["--processes"]], ids=["one process", "processes"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+@pytest.mark.parametrize(
+    ("options", "number"),
+    [([], signal.SIGINT), ([], signal.SIGTERM), (["--processes"], signal.SIGINT)],
+    ids=["Ctrl-C in one process", "terminated in one process", "Ctrl-C with processes"],
+)
 def test_an_interrupted_run_leaves_a_readable_bag(options, number, limb, processes, until, bags, tmp_path):
     out = tmp_path / "run"
     source = "flexor=0.9,extensor=0"
