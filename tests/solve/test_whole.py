@@ -158,7 +158,7 @@ def total_torque(model, y: np.ndarray, u: np.ndarray) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize("name", LIMBS)
+@pytest.mark.parametrize("name", [name for name in LIMBS if name != "seated_knee"])
 def test_slopes_of_the_torque(name, model_named, waves):
     """Slopes in angle, velocity and time, through the closed loop, against differences of the torque."""
     model = model_named(name, free=True)
