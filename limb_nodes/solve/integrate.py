@@ -30,8 +30,8 @@ MOST_STEPS = 2e8
 
 @njit(cache=True, error_model="numpy")
 def overshoot(new_y, limits, joints, locked):
-    """The free joint farthest beyond its limit and how far (rad); joint -1 where there is none."""
-    joint, worst = -1, TOUCH
+    """The free joint farthest beyond its limit and how far (rad, negative where none is)."""
+    joint, worst = -1, -math.inf
     for j in range(joints):
         if locked[j] == 0.0:
             beyond = max(new_y[j] - limits[joints + j], limits[j] - new_y[j])
@@ -41,9 +41,32 @@ def overshoot(new_y, limits, joints, locked):
 
 
 @njit(cache=True, error_model="numpy")
+def turning_point(y, new_y, limits, joints, locked, h):
+    """Part of a step after which a free joint turns back so near its limit that it may have crossed it.
+
+    The largest such part, 0.0 where there is none: by its velocity a joint that turns within the
+    step has gone at most a quarter of the step beyond both its ends.
+    """
+    found = 0.0
+    for j in range(joints):
+        if locked[j] != 0.0:
+            continue
+        before, after = y[joints + j], new_y[joints + j]
+        if before > 0.0 and after < 0.0:
+            room = limits[joints + j] - max(y[j], new_y[j])
+        elif before < 0.0 and after > 0.0:
+            room = min(y[j], new_y[j]) - limits[j]
+        else:
+            continue
+        if room < 0.25 * h * max(abs(before), abs(after)):
+            found = max(found, before / (before - after))
+    return found
+
+
+@njit(cache=True, error_model="numpy")
 def pulled_back(reaction, joints, locked):
-    """The joint on a limit that is pulled off it most strongly, and the pull (N m), or -1."""
-    joint, worst = -1, 0.0
+    """The joint on a limit that is pulled off it most strongly, and the pull (N m, negative where none is)."""
+    joint, worst = -1, -math.inf
     for j in range(joints):
         if locked[j] != 0.0 and locked[j] * reaction[j] > worst:
             joint, worst = j, locked[j] * reaction[j]
@@ -236,31 +259,68 @@ def integrate(
                 h *= max(0.2, 0.9 * error**power)
             progress[1] += 1
             continue
-        event = 0
-        joint = -1
+        event, joint, value = 0, -1, 0.0
         if joints > 0:
-            joint, _ = overshoot(new_y, limits, joints, locked)
-            if joint >= 0:
+            part = turning_point(y, new_y, limits, joints, locked, h)
+            if part > 0.0:
+                # The ends of a step do not tell of a touch in between: look where the joint turns.
+                take_step(
+                    method,
+                    rates,
+                    t,
+                    part * h,
+                    y,
+                    stages,
+                    slopes,
+                    p,
+                    k,
+                    u,
+                    c,
+                    stage_y,
+                    new_y,
+                    matrix,
+                    pivots,
+                    start_rates,
+                )
+                if overshoot(new_y, limits, joints, locked)[1] > TOUCH:
+                    h = part * h
+                    clipped = False
+                else:
+                    take_step(
+                        method,
+                        rates,
+                        t,
+                        h,
+                        y,
+                        stages,
+                        slopes,
+                        p,
+                        k,
+                        u,
+                        c,
+                        stage_y,
+                        new_y,
+                        matrix,
+                        pivots,
+                        start_rates,
+                    )
+            joint, value = overshoot(new_y, limits, joints, locked)
+            if value > TOUCH:
                 event = 1
             elif t + h > quiet_until:
                 call(reactions, t + h, new_y, p, k, u, c, stage_y)
-                joint, _ = pulled_back(stage_y, joints, locked)
-                if joint >= 0:
+                joint, value = pulled_back(stage_y, joints, locked)
+                if value > 0.0:
                     event = 2
-        side, limit = 1.0, 0.0
         if event != 0:
-            # Shorten the step until the event lies at its end (Illinois variant of false position).
-            short, long = 0.0, h
-            short_value, long_value = -1.0, 0.0
+            # Shorten the step until the first event lies at its end (Illinois variant of false position).
+            short, long, long_value = 0.0, h, value
             if event == 1:
-                side = 1.0 if new_y[joint] > limits[joints + joint] else -1.0
-                limit = limits[joints + joint] if side > 0.0 else limits[joint]
-                short_value = min(-1e-300, side * (y[joint] - limit))
-                long_value = side * (new_y[joint] - limit)
+                _, short_value = overshoot(y, limits, joints, locked)
             else:
-                long_value = locked[joint] * stage_y[joint]
                 call(reactions, t, y, p, k, u, c, stage_y)
-                short_value = min(-1e-300, locked[joint] * stage_y[joint])
+                _, short_value = pulled_back(stage_y, joints, locked)
+            short_value = min(-1e-300, short_value)
             for _ in range(60):
                 part = short_value / (short_value - long_value)
                 h = short + min(0.99, max(0.01, part)) * (long - short)
@@ -283,10 +343,10 @@ def integrate(
                     start_rates,
                 )
                 if event == 1:
-                    value = side * (new_y[joint] - limit)
+                    joint, value = overshoot(new_y, limits, joints, locked)
                 else:
                     call(reactions, t + h, new_y, p, k, u, c, stage_y)
-                    value = locked[joint] * stage_y[joint]
+                    joint, value = pulled_back(stage_y, joints, locked)
                 if value > 0.0:
                     if value > 0.5 * long_value:
                         short_value *= 0.5
@@ -311,7 +371,8 @@ def integrate(
         progress[0] += 1
         fresh = False
         if event == 1:
-            y[joint] = limit
+            side = 1.0 if y[joint] - limits[joints + joint] > limits[joint] - y[joint] else -1.0
+            y[joint] = limits[joints + joint] if side > 0.0 else limits[joint]
             locked[joint] = side
             call(strike, t, y, p, k, u, c, stage_y)
             h = max(h, 0.1 * wanted)
