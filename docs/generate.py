@@ -189,9 +189,9 @@ def law_section(name: str, law: Law) -> str:
             (f"`{state.name}`", state.unit, f"`{state.rate}`", f"`{state.initial}`", state.number)
             for state in law.states
         ]
-        parts.append(table(("state", "unit", "rate", "starts at", "equation"), rows))
+        parts += ["States:", table(("state", "unit", "rate", "starts at", "equation"), rows)]
     if law.parameters:
-        parts.append(parameter_table(law.parameters))
+        parts += ["Parameters:", parameter_table(law.parameters)]
     return "\n\n".join(parts)
 
 
