@@ -1,0 +1,38 @@
+"""SUNDIALS' CVODE through scikit-sundae, with the product's compiled right-hand side."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from limb_nodes.model.layout import FloatArray
+from limb_nodes.solve.whole import WholeModel
+
+NAME = "sundae CVODE, compiled"
+
+
+def solve(
+    model: WholeModel, inputs: FloatArray, period: float, times: FloatArray, tolerance: float, method: str
+) -> FloatArray:
+    """States [T, states] at some times. method: "BDF" or "Adams"."""
+    from sksundae.cvode import CVODE
+
+    layout, rates, context = model.layout, model.program.rates, model.context(0.0, period)
+    parameters, index = layout.parameters, layout.index
+
+    def right_hand_side(t: float, y: FloatArray, out: FloatArray) -> None:
+        rates(t, y, parameters, index, inputs, context, out)
+
+    solver: Any = CVODE(
+        right_hand_side,
+        method=method,
+        rtol=tolerance,
+        atol=tolerance * model.state_scale,
+        max_step=0.1,
+        max_num_steps=1_000_000,
+    )
+    found = solver.solve(times, model.initial_state())
+    if not found.success:
+        raise RuntimeError(found.message)
+    return np.asarray(found.y)
