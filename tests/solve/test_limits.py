@@ -15,13 +15,14 @@ def pulse(time: np.ndarray) -> np.ndarray:
     return np.column_stack([np.where(time < 0.5, 1.0, 0.0), np.zeros(time.size)])
 
 
+@pytest.fixture(scope="module")
+def found(model_named):
+    model = model_named("reference_joint", {"segments[0].range": [-2.0, 0.6]})
+    return model.simulate(pulse(np.arange(1501) / RATE), RATE, method="explicit", tolerance=1e-11)
+
+
 class TestLimit:
     """The reference joint against a limit at 0.6 rad."""
-
-    @pytest.fixture(scope="class")
-    def found(self, model_named):
-        model = model_named("reference_joint", {"segments[0].range": [-2.0, 0.6]})
-        return model.simulate(pulse(np.arange(1501) / RATE), RATE, method="explicit", tolerance=1e-11)
 
     def test_it_stops_and_stays_while_it_is_pressed(self, found):
         angle, velocity = found.angle[:, 0], found.velocity[:, 0]
