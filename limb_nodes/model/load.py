@@ -18,7 +18,7 @@ from limb_nodes.model.check_law import check_laws
 from limb_nodes.model.choice import choose_law, read_law
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
-from limb_nodes.model.section import Section, parse_yaml, read_yaml
+from limb_nodes.model.section import Section, parse_yaml, read_yaml, yaml_text
 
 BASE_ANGLE = Parameter(
     "base_angle",
@@ -111,7 +111,7 @@ def with_values(limb: Limb, values: Mapping[str, Any]) -> Limb:
             target[steps[-1]] = value
         except (IndexError, TypeError):
             raise UserError(f"{limb.file}: {place} is not a place of this limb") from None
-    return build_limb(content, limb.file, limb.text)
+    return build_limb(content, limb.file, yaml_text(content))
 
 
 def unshared(content: Any) -> Any:
@@ -129,6 +129,7 @@ def build_limb(content: Any, file: str, text: str) -> Limb:
     segments = tuple(read_segment(section) for section in top.sections("segments", required=True))
     joints = [segment.joint for segment in segments]
     refuse_twins(top, "segments", "joint", joints)
+    refuse_twins(top, "segments", "name", [segment.name for segment in segments])
     sarcomeres = read_named(top, "sarcomeres")
     kinds = read_named(top, "unit_kinds")
     muscles = tuple(
@@ -207,6 +208,13 @@ def read_muscle(
     return Muscle(name, joints.index(joint), role, threshold, laws, tuple(ordered), section.place)
 
 
+def overlaid(given: Any, own: Any) -> Any:
+    """A unit's own value over that of its kind: parameters of the same law are merged."""
+    if isinstance(given, dict) and isinstance(own, dict) and own.get("law", given.get("law")) == given.get("law"):
+        return {**given, **own}
+    return own
+
+
 def read_units(
     section: Section,
     position: int,
@@ -218,6 +226,8 @@ def read_units(
     if section.has("kind"):
         kind = kinds[section.choice("kind", kinds)]
         content = {**kind.content, **section.content}
+        for key, value in section.content.items():
+            content[key] = overlaid(kind.content.get(key), value)
         inherited = {key: kind.at(key) for key in kind.content if key not in section.content}
         section = Section(section.file, section.place, content, inherited)
     section.take("kind")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,13 @@ def parse_yaml(text: str, file: str) -> Any:
     except (YAMLError, ValueError) as problem:
         # ValueError: a date or a tagged number that is none.
         raise UserError(f"{file}: not YAML: {one_line(problem)}") from None
+
+
+def yaml_text(content: Any) -> str:
+    """The YAML text of plain data."""
+    stream: io.StringIO = io.StringIO()
+    YAML(typ="safe", pure=True).dump(content, stream)
+    return str(stream.getvalue())
 
 
 def one_line(text: object) -> str:

@@ -25,7 +25,8 @@ DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2, 3
 TOUCH = 1e-12
 # After a release the joint is left alone for this long (s), so that rounding cannot catch it again.
 LEAST_FLIGHT = 1e-9
-MOST_STEPS = 2e8
+# Steps per second of movement, at least for one second, after which the solver gives up.
+MOST_STEPS = 1e6
 
 
 @njit(cache=True, error_model="numpy")
@@ -38,6 +39,15 @@ def overshoot(new_y, limits, joints, locked):
             if beyond > worst:
                 joint, worst = j, beyond
     return joint, worst
+
+
+@njit(cache=True, error_model="numpy")
+def any_locked(locked):
+    """Whether a joint rests on its limit."""
+    for flag in locked:
+        if flag != 0.0:
+            return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")
@@ -211,7 +221,7 @@ def integrate(
     last_error = 1e-4
     quiet_until = start
     while t < end:
-        if progress[0] + progress[1] > MOST_STEPS:
+        if progress[0] + progress[1] > MOST_STEPS * max(1.0, span):
             progress[2] = t
             return TOO_MANY_STEPS
         while stop < stops.size and stops[stop] <= t + 1e-15 * max(1.0, abs(t)):
@@ -307,7 +317,7 @@ def integrate(
             joint, value = overshoot(new_y, limits, joints, locked)
             if value > TOUCH:
                 event = 1
-            elif t + h > quiet_until:
+            elif t + h > quiet_until and any_locked(locked):
                 call(reactions, t + h, new_y, p, k, u, c, stage_y)
                 joint, value = pulled_back(stage_y, joints, locked)
                 if value > 0.0:

@@ -413,3 +413,19 @@ def test_every_number_has_unit_and_source(path):
             assert re.fullmatch(r"1|[A-Za-z]+(\^2)?([ /][A-Za-z()/ ]+(\^2)?)?|1/s|1/\(M s\)", part.strip()), where
         assert re.search(r"[A-Za-z]{3}|%", source), where
     assert seen or path.stem.startswith("activation")
+
+
+def test_a_limb_with_other_values_carries_them_in_its_text():
+    limb = load_limb(PARAMS / "seated_knee.yaml")
+    place = "muscles[0].units[0].force_length.omega"
+    changed = with_values(limb, {place: 0.9})
+    again = parse_limb(changed.text, "again.yaml")
+    for found in (changed, again):
+        ours, theirs = found.muscles[0].units[0].laws["force_length"], limb.muscles[0].units[0].laws["force_length"]
+        assert ours.values == {**theirs.values, "omega": 0.9}
+
+
+def test_segments_have_names_of_their_own():
+    limb = load_limb(PARAMS / "arm.yaml")
+    with pytest.raises(UserError, match=r"segments\[1\]\.name is '.*' a second time"):
+        with_values(limb, {"segments[1].name": limb.segments[0].name})
