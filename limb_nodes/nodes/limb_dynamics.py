@@ -25,6 +25,9 @@ from limb_nodes.solve.stepping import LimbStepper
 
 TORQUE_FIELDS = ("torque", "slope_angle", "slope_velocity", "slope_time")
 REMEMBERED = 1000
+# How many ticks the limb goes on with a torque in real time. Farther its slopes say nothing, and muscles that
+# cannot follow would be buried in joint states until some are lost.
+MOST_AHEAD = 50
 REPORT_PERIOD = 1.0
 
 
@@ -159,6 +162,8 @@ class LimbDynamics(LimbNode):
         due = int((now - self.started_at) / self.ticks.period + 0.5)
         while self.tick < due and not self.finished:
             tick, rows = self.newest
+            if self.tick - tick >= MOST_AHEAD:
+                break
             # Each tick that came too late, or without its own torque, is one missed deadline.
             self.missed += self.tick + 1 < due or tick != self.tick
             if tick != self.tick:

@@ -159,9 +159,11 @@ class MuscleStack(LimbNode):
         values = self.torque.values
         values["torque"][:], values["slope_angle"][:] = rows[0], rows[1]
         values["slope_velocity"][:], values["slope_time"][:] = rows[2], rows[3]
-        values["last"][...] = tick == self.last
+        # In real time a tick may be answered before its activation says that it is the last.
+        ended = self.last is not None and tick >= self.last
+        values["last"][...] = ended
         self.torque.publish(tick)
-        self.finished = tick == self.last
+        self.finished = ended
         for old in [key for key in self.inputs if key < tick]:
             del self.inputs[old]
 

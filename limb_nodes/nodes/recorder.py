@@ -72,6 +72,7 @@ class Recorder(LimbNode):
         self.counts = dict.fromkeys(TICKED, 0)
         self.expected = {topic: 1 for topic in TICKED if topic not in STATES}
         self.last_tick: int | None = None
+        self.last_activation: int | None = None
         self.announced = -2
         self.parameters: dict[str, dict[str, Any]] = {"recorder": own_parameters(self)}
         self.asked: dict[str, AsyncParameterClient] = {}
@@ -170,6 +171,8 @@ class Recorder(LimbNode):
         self.put(topic, stamp, data)
         if topic == "joint_torque" and is_last(data):
             self.last_tick = tick
+        if topic == "activation" and is_last(data):
+            self.last_activation = tick
         if tick % PROGRESS_EVERY == 0 or self.last_tick is not None:
             self.announce()
 
@@ -191,11 +194,18 @@ class Recorder(LimbNode):
         complete = min(
             self.newest[topic] + every - 1 if self.newest[topic] >= 0 else -1 for topic, every in self.expected.items()
         )
-        if self.last_tick is not None and complete >= self.last_tick:
+        if self.last_tick is not None and self.holds(self.last_tick):
             self.finished = True
         if complete > self.announced:
             self.announced = complete
             self.progress.publish(Int64(data=complete if complete >= 0 and self.counts["joint_states"] else -1))
+
+    def holds(self, last: int) -> bool:
+        """Whether every topic is there to its end; in real time the activation may have ended before."""
+        ends = dict.fromkeys(self.expected, last)
+        if self.last_activation is not None:
+            ends["activation"] = min(last, self.last_activation)
+        return all(self.newest[topic] + every - 1 >= ends[topic] for topic, every in self.expected.items())
 
     def missing(self) -> int:
         """Ticks that are not in the bag on a topic that should have them."""
@@ -214,7 +224,7 @@ class Recorder(LimbNode):
 
 
 def is_last(data: bytes) -> bool:
-    """The flag `last` of a serialised JointTorque: behind the header and the tick."""
+    """The flag `last` of a serialised JointTorque or MuscleActivation: behind the header and the tick."""
     (length,) = struct.unpack_from("<I", data, 12)
     tick = -(-(12 + length) // 8) * 8
     return data[4 + tick + 8] == 1
