@@ -108,7 +108,8 @@ def with_values(limb: Limb, values: Mapping[str, Any]) -> Limb:
             except (IndexError, KeyError, TypeError):
                 raise UserError(f"{limb.file}: {place} is not a place of this limb") from None
         try:
-            target[steps[-1]] = value
+            # Numbers of numpy as plain ones, which YAML can hold.
+            target[steps[-1]] = value.item() if hasattr(value, "item") else value
         except (IndexError, TypeError):
             raise UserError(f"{limb.file}: {place} is not a place of this limb") from None
     return build_limb(content, limb.file, yaml_text(content))

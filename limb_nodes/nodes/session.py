@@ -38,8 +38,10 @@ CLASSES = {
 STARTING = 60.0
 ENDING = 10.0
 # How long other nodes of the domain may take to be found (s).
-DISCOVERY = 0.5
+DISCOVERY = 1.5
 ERROR = "limb: error: "
+# How often to look for another run on the same topics (s).
+COMPANY_PERIOD = 0.25
 # Longest run (s).
 LONGEST = 1e9
 
@@ -116,6 +118,7 @@ def run_in_one_process(run: Run, progress: Progress) -> Outcome:
         recorder, dynamics = nodes["recorder"], nodes["limb_dynamics"]
         started = None
         shown = -2
+        looked = 0.0
         while not (recorder.finished or interrupt.wanted):
             executor.spin_once(timeout_sec=0.05)
             if started is None and dynamics.tick > 0:
@@ -123,6 +126,9 @@ def run_in_one_process(run: Run, progress: Progress) -> Outcome:
             if recorder.announced != shown:
                 shown = recorder.announced
                 progress(shown)
+            # Also where nothing gets on: a neighbour's messages may be why.
+            if time.monotonic() - looked > COMPANY_PERIOD:
+                looked = time.monotonic()
                 refuse_company(dynamics)
             for node in nodes.values():
                 if node.failure:
