@@ -26,7 +26,7 @@ def write_movement(
     count = len(movement.time)
     tick = np.arange(count, dtype=np.uint64)
     stamps = np.arange(count, dtype=np.int64) * round(1e9 / rate)
-    last = tick == count - 1
+    last = np.full(count, count - 1)
     joints, muscles = limb.joint_names, limb.muscle_names
     owners = [muscle.name for muscle in limb.muscles for _ in muscle.units]
     units = [unit.name for muscle in limb.muscles for unit in muscle.units]
@@ -42,7 +42,7 @@ def write_movement(
             "activation",
             stamps,
             {"name": muscles},
-            {"tick": tick, "last": last, "activation": movement.excitation},
+            {"tick": tick, "last_tick": last, "activation": movement.excitation},
         )
         write_table(
             writer,
@@ -56,7 +56,7 @@ def write_movement(
             "joint_torque",
             stamps,
             {"joint": joints},
-            {"tick": tick, "last": last, "torque": torque},
+            {"tick": tick, "last_tick": last, "torque": torque},
         )
         write_table(
             writer,

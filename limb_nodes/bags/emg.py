@@ -297,7 +297,14 @@ def write_envelopes(found: Envelopes, out: str | Path, options: EnvelopeOptions 
             bag.write(
                 ENVELOPE_TOPIC,
                 stamp,
-                make_message(TOPIC_TYPES[ENVELOPE_TOPIC], stamp, tick=tick, name=names, activation=values),
+                make_message(
+                    TOPIC_TYPES[ENVELOPE_TOPIC],
+                    stamp,
+                    tick=tick,
+                    last_tick=len(found.values) - 1,
+                    name=names,
+                    activation=values,
+                ),
             )
             if angle_names:
                 bag.write(

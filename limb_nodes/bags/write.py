@@ -82,6 +82,15 @@ class BagWriter:
         self.write(RUN_INFO, 0, make_message(TOPIC_TYPES[RUN_INFO], data=text))
         self._submit()
 
+    def expect(self, types: Mapping[str, str]) -> None:
+        """Get topics ready, so that their first messages take no longer than the others.
+
+        Args:
+            types: topic, relative to the namespace or absolute -> message type.
+        """
+        for topic, msgtype in types.items():
+            self._connect(topic, msgtype)
+
     def write(self, topic: str, stamp_ns: int, message: Any) -> None:
         """Write a message of `make_message`, or as `BagReader.read_topic` gives it.
 

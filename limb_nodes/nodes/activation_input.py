@@ -53,10 +53,16 @@ class ActivationInput(LimbNode):
         self.envelopes: Any = None
         self.newest = np.zeros(len(self.muscles))
         self.sent = -1
-        example = MuscleActivation(name=self.muscles, activation=[0.0] * len(self.muscles))
+        example = MuscleActivation(
+            last_tick=-1 if self.final is None else self.final,
+            name=self.muscles,
+            activation=[0.0] * len(self.muscles),
+        )
         publisher = self.create_publisher(MuscleActivation, "activation", STREAM)
         self.activation = Outgoing(publisher, example, self.ticks.nanoseconds)
         self.joint_states = Incoming(JointState, "name", self.ticks.nanoseconds)
+        zeros = [0.0] * len(self.limb.joint_names)
+        self.joint_states.expect(JointState(name=self.limb.joint_names, position=zeros, velocity=zeros))
         self.listen(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
 
     def hear_envelopes(self) -> None:
@@ -90,7 +96,6 @@ class ActivationInput(LimbNode):
         for tick in range(self.sent + 1, last + 1):
             values = self.activation.values
             values["activation"][:] = self.newest if self.source is None else self.source.values[tick]
-            values["last"][...] = tick == self.final
             self.activation.publish(tick)
         self.sent = max(self.sent, last)
 

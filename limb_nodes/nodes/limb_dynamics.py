@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import time
 from collections import OrderedDict
 from typing import Any
@@ -46,19 +47,21 @@ class LimbDynamics(LimbNode):
             "await_recorder", False, "start with the recorder and never run farther ahead than it can take"
         )
         self.stepper = LimbStepper(self.limb)
-        self.stepper.acceleration(np.zeros((4, self.stepper.joints)))
         self.joints = self.limb.joint_names
         self.tick = 0
         self.missed = 0
+        self.told = 0
         self.recorded = -1
         self.pending: bytes | None = None
         self.newest: tuple[int, np.ndarray] | None = None
         self.history: OrderedDict[int, tuple[np.ndarray, np.ndarray]] = OrderedDict()
         self.started_at: float | None = None
         self.last_report = 0.0
-        self.last_tick: int | None = None
+        self.last_tick = -1
         self.joint_states, self.pattern = self.messages()
         self.torque = Incoming(JointTorque, "joint", self.ticks.nanoseconds)
+        zeros = [0.0] * len(self.joints)
+        self.torque.expect(JointTorque(joint=self.joints, **dict.fromkeys(TORQUE_FIELDS, zeros)))
         self.description = self.create_publisher(String, "robot_description", LATCHED)
         self.description.publish(String(data=urdf(self.limb)))
         self.listen(JointTorque, "joint_torque", self.on_torque, STREAM, raw=True)
@@ -68,6 +71,8 @@ class LimbDynamics(LimbNode):
         else:
             self.offer()
         if self.mode == "realtime":
+            # The first warning would look through all modules for its caller, which takes as long as many ticks.
+            inspect.getmodule(inspect.currentframe())
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(self.ticks.period, self.on_timer, clock=steady)
 
@@ -132,8 +137,7 @@ class LimbDynamics(LimbNode):
         if not sound(rows.reshape(-1)):
             self.complain(f"joint_torque of tick {tick}: finite numbers for {', '.join(self.joints)} needed")
             return
-        if message.flag("last"):
-            self.last_tick = tick
+        self.last_tick = int(message["last_tick"][0])
         if self.mode == "realtime":
             if self.newest is None or tick > self.newest[0]:
                 self.newest = tick, rows
@@ -188,8 +192,7 @@ class LimbDynamics(LimbNode):
 
     def step(self, rows: np.ndarray) -> None:
         """Publish the movement pattern of this tick and go on to the next."""
-        # In real time the limb may have gone on before it heard which tick is the last.
-        self.finished = self.last_tick is not None and self.tick >= self.last_tick
+        self.finished = 0 <= self.last_tick <= self.tick
         if self.finished and self.mode == "realtime":
             # Before the message with which the recording ends.
             self.report()
@@ -216,8 +219,9 @@ class LimbDynamics(LimbNode):
         """Publish how real time is kept."""
         message = f"{self.missed} missed deadlines in {self.tick} ticks"
         self.diagnose(message, bad=bool(self.missed), ticks=self.tick, missed_deadlines=self.missed)
-        if self.missed:
-            self.get_logger().warning(message, throttle_duration_sec=1.0)
+        if self.missed > self.told:
+            self.told = self.missed
+            self.get_logger().warning(message)
 
 
 main = main_of(LimbDynamics)

@@ -42,7 +42,7 @@ class MuscleStack(LimbNode):
         self.last_drive: np.ndarray | None = None
         self.excitation = np.zeros(len(self.muscles))
         self.inputs: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        self.last: int | None = None
+        self.last_tick = -1
         self.waiting: tuple[int, np.ndarray, np.ndarray] | None = None
         joints = self.limb.joint_names
         zeros = [0.0] * n
@@ -51,7 +51,9 @@ class MuscleStack(LimbNode):
         self.torque = Outgoing(self.create_publisher(JointTorque, "joint_torque", STREAM), example, nanoseconds)
         self.states = self.state_topics()
         self.activation = Incoming(MuscleActivation, "name", nanoseconds)
+        self.activation.expect(MuscleActivation(name=self.muscles, activation=[0.0] * len(self.muscles)))
         self.joint_states = Incoming(JointState, "name", nanoseconds)
+        self.joint_states.expect(JointState(name=joints, position=zeros, velocity=zeros))
         self.listen(MuscleActivation, "activation", self.on_activation, STREAM, raw=True)
         self.listen(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
 
@@ -91,8 +93,7 @@ class MuscleStack(LimbNode):
         except ValueError as problem:
             self.complain(f"activation: {problem}")
             return
-        if message.flag("last"):
-            self.last = tick
+        self.last_tick = int(message["last_tick"][0])
         if tick <= self.tick or tick in self.inputs:
             return
         values = in_order(message, "activation", self.muscles)
@@ -133,7 +134,7 @@ class MuscleStack(LimbNode):
         if self.waiting is None:
             return
         tick = self.waiting[0]
-        if tick in self.inputs and (tick == self.last or tick + 1 in self.inputs):
+        if tick in self.inputs and (tick == self.last_tick or tick + 1 in self.inputs):
             self.send(self.inputs.get(tick + 1))
 
     def send(self, following: tuple[np.ndarray, np.ndarray] | None) -> None:
@@ -159,11 +160,9 @@ class MuscleStack(LimbNode):
         values = self.torque.values
         values["torque"][:], values["slope_angle"][:] = rows[0], rows[1]
         values["slope_velocity"][:], values["slope_time"][:] = rows[2], rows[3]
-        # In real time a tick may be answered before its activation says that it is the last.
-        ended = self.last is not None and tick >= self.last
-        values["last"][...] = ended
+        values["last_tick"][...] = self.last_tick
         self.torque.publish(tick)
-        self.finished = ended
+        self.finished = 0 <= self.last_tick <= tick
         for old in [key for key in self.inputs if key < tick]:
             del self.inputs[old]
 

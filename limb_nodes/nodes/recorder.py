@@ -6,6 +6,7 @@ import struct
 import time
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -63,16 +64,13 @@ class Recorder(LimbNode):
         if not out:
             raise UserError("recorder: the parameter out is empty; the folder of a new bag is needed")
         self.path = out
-        from pathlib import Path
-
         refuse_existing(Path(out))
         self.writer: BagWriter | None = None
         self.buffer: list[tuple[str, int, bytes]] = []
         self.newest = dict.fromkeys(TICKED, -1)
         self.counts = dict.fromkeys(TICKED, 0)
         self.expected = {topic: 1 for topic in TICKED if topic not in STATES}
-        self.last_tick: int | None = None
-        self.last_activation: int | None = None
+        self.last_tick = -1
         self.announced = -2
         self.parameters: dict[str, dict[str, Any]] = {"recorder": own_parameters(self)}
         self.asked: dict[str, AsyncParameterClient] = {}
@@ -128,6 +126,7 @@ class Recorder(LimbNode):
             if muscle_stack.get(f"publish_{topic}", True):
                 self.expected[topic] = int(muscle_stack.get("state_every", 1))
         self.writer = BagWriter(self.path, self.run_info(), namespace=self.get_namespace())
+        self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.expected, "/diagnostics")})
         for topic, stamp, data in self.buffer:
             self.writer.write_raw(topic, stamp, data, TOPIC_TYPES[topic])
         self.buffer.clear()
@@ -169,11 +168,9 @@ class Recorder(LimbNode):
         self.newest[topic] = tick
         self.counts[topic] += 1
         self.put(topic, stamp, data)
-        if topic == "joint_torque" and is_last(data):
-            self.last_tick = tick
-        if topic == "activation" and is_last(data):
-            self.last_activation = tick
-        if tick % PROGRESS_EVERY == 0 or self.last_tick is not None:
+        if topic == "joint_torque":
+            self.last_tick = last_tick(data)
+        if tick % PROGRESS_EVERY == 0 or 0 <= self.last_tick <= tick:
             self.announce()
 
     def on_other(self, topic: str, data: bytes) -> None:
@@ -194,18 +191,10 @@ class Recorder(LimbNode):
         complete = min(
             self.newest[topic] + every - 1 if self.newest[topic] >= 0 else -1 for topic, every in self.expected.items()
         )
-        if self.last_tick is not None and self.holds(self.last_tick):
-            self.finished = True
+        self.finished = 0 <= self.last_tick <= complete
         if complete > self.announced:
             self.announced = complete
             self.progress.publish(Int64(data=complete if complete >= 0 and self.counts["joint_states"] else -1))
-
-    def holds(self, last: int) -> bool:
-        """Whether every topic is there to its end; in real time the activation may have ended before."""
-        ends = dict.fromkeys(self.expected, last)
-        if self.last_activation is not None:
-            ends["activation"] = min(last, self.last_activation)
-        return all(self.newest[topic] + every - 1 >= ends[topic] for topic, every in self.expected.items())
 
     def missing(self) -> int:
         """Ticks that are not in the bag on a topic that should have them."""
@@ -223,11 +212,12 @@ class Recorder(LimbNode):
             super().destroy_node()
 
 
-def is_last(data: bytes) -> bool:
-    """The flag `last` of a serialised JointTorque or MuscleActivation: behind the header and the tick."""
+def last_tick(data: bytes) -> int:
+    """The field `last_tick` of a serialised JointTorque: behind the header and the tick."""
     (length,) = struct.unpack_from("<I", data, 12)
     tick = -(-(12 + length) // 8) * 8
-    return data[4 + tick + 8] == 1
+    (found,) = struct.unpack_from("<q", data, 4 + tick + 8)
+    return int(found)
 
 
 def own_parameters(node: LimbNode) -> dict[str, Any]:

@@ -72,6 +72,13 @@ class Incoming:
         self._constant: list[tuple[int, int, bytes]] = []
         self._numbers: dict[str, tuple[int, np.dtype[Any], int]] = {}
 
+    def expect(self, example: Any) -> None:
+        """Get ready for messages like an example, so that the first takes no longer than the others."""
+        data = serialize_message(example)
+        layout = Layout(data, limb_typestore())
+        layout.message(self._kind, "")
+        self._learn(data[: layout.end])
+
     def read(self, data: bytes) -> int:
         """Take in a message; its tick by its stamp. Raises ValueError if it is no such message."""
         if len(data) != self._size or any(data[a:b] != text for a, b, text in self._constant):
@@ -85,10 +92,6 @@ class Incoming:
         """A field of the message last read, as an array that must not be kept."""
         start, dtype, count = self._numbers[name]
         return np.frombuffer(self._data, dtype=dtype, count=count, offset=start)
-
-    def flag(self, name: str) -> bool:
-        """A field of type bool of the message last read."""
-        return self._data[self._numbers[name][0]] != 0
 
     def _learn(self, data: bytes) -> None:
         """Find where everything is in messages of this size with these names."""

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from numba import njit, types
+
+# Compiled, or loaded, with this module: the first tick must not take longer than the others.
+CHECK = types.boolean(types.float64[::1])
 
 
-@njit(cache=True)
+@njit(CHECK, cache=True)
 def finite(values):
     """Whether all numbers [n] are finite."""
     for value in values:
@@ -16,7 +19,7 @@ def finite(values):
     return True
 
 
-@njit(cache=True)
+@njit(CHECK, cache=True)
 def within_unit(values):
     """Whether all numbers [n] are from 0 to 1."""
     for value in values:

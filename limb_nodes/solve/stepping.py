@@ -21,6 +21,8 @@ from limb_nodes.solve.whole import FAILURES, SolveError, WholeModel
 
 TICK_TOLERANCE = 1e-9
 NO_TIMES = np.empty(0)
+# A tick of the rehearsal (s).
+REHEARSAL = 1e-3
 NO_ROWS = np.empty((0, 0))
 
 
@@ -41,7 +43,21 @@ class MuscleStepper:
         self._muscles = np.zeros((layout.muscles, len(MUSCLE_OUTPUTS)))
         self._units = np.zeros((layout.units, len(UNIT_OUTPUTS)))
         self._progress = np.zeros(4)
-        self._rows: dict[int, FloatArray] = {}
+        self._rehearse()
+
+    def _rehearse(self) -> None:
+        """Do what a tick does, so that it is compiled and loaded before the first."""
+        n, layout = self.joints, self.model.layout
+        start = self.model.initial_state()
+        posture = start[:n], start[n : 2 * n]
+        excitation = np.zeros(layout.muscles)
+        drive = self.drive(excitation)
+        for last_drive in (None, drive):
+            self.torque(*posture, drive, drive, REHEARSAL, last_drive)
+            self.advance(posture, posture, drive, drive, REHEARSAL, last_drive)
+        self.observe(*posture, excitation)
+        self.internal[:] = layout.initial_states
+        self._context = self.model.context(0.0, 1.0)
 
     @property
     def shown(self) -> tuple[FloatArray, FloatArray]:
@@ -174,6 +190,17 @@ class LimbStepper:
         self._progress = np.zeros(4)
         # What the last step expects of the next torque; empty where it says nothing.
         self._expected: FloatArray = np.empty(n)
+        self._predicted = NO_TIMES
+        self._rehearse(state)
+
+    def _rehearse(self, start: FloatArray) -> None:
+        """Do what a tick does, so that it is compiled and loaded before the first."""
+        torque = np.zeros((4, self.joints))
+        self.acceleration(torque)
+        self.step(torque, REHEARSAL)
+        self.step(torque, REHEARSAL)
+        self._state[:] = start
+        self._context = self.model.context(0.0, 1.0)
         self._predicted = NO_TIMES
 
     @property

@@ -314,7 +314,7 @@ class Bags:
         with BagWriter(path, {"rate": rate}) as bag:
             for k, row in enumerate(columns):
                 message = make_message(
-                    "limb_msgs/msg/MuscleActivation", k * period, tick=k, last=k == len(columns) - 1,
+                    "limb_msgs/msg/MuscleActivation", k * period, tick=k, last_tick=len(columns) - 1,
                     name=list(values), activation=row,
                 )  # fmt: skip
                 bag.write("emg_envelope", k * period, message)
