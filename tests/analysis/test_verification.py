@@ -249,7 +249,6 @@ def test_all_cases_pass_by_the_whole_model_solve(capsys):
 
 def test_quick_cases_pass_by_the_graph_and_are_drawn(capfd, tmp_path, monkeypatch):
     pytest.importorskip("rclpy")
-    monkeypatch.setenv("ROS_DOMAIN_ID", "87")
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
     cases = ["--case", "3.4", "--case", "3.6-range"]
     assert main(["verify", "--graph", *cases, "--figures", str(tmp_path / "figures")]) == 0

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 DOMAINS = 101
 
 ROOT = Path(__file__).resolve().parents[2]
