@@ -126,7 +126,8 @@ class Variants:
         """A model with the program of the base."""
         model = copy.copy(self.base)
         # What has been found for the base does not hold for its variants.
-        model.__dict__.pop("suited_method", None)
+        for name in ("suited_method", "drive_table"):
+            model.__dict__.pop(name, None)
         model.limb, model.layout = limb, layout
         return model
 

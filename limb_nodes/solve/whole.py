@@ -12,6 +12,7 @@ from limb_nodes.errors import UserError
 from limb_nodes.model.layout import FloatArray, Layout, build_layout
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve.compile import compiled
+from limb_nodes.solve.drive_table import DriveTable
 from limb_nodes.solve.integrate import (
     DONE,
     EXPLICIT,
@@ -28,6 +29,8 @@ from limb_nodes.solve.pieces import corners, pieces
 ANGLE_SCALE, VELOCITY_SCALE = 1.0, 10.0
 TOLERANCE = 1e-9
 LONGEST_STEP = 0.1
+# Samples from which a table of the drives costs less than their laws.
+TABLE_PAYS = 2000
 METHODS = {"explicit": EXPLICIT, "implicit": IMPLICIT}
 # Rate (1/s) from which steps that accuracy allows would be unstable with the explicit method.
 STIFF = 2000.0
@@ -139,9 +142,18 @@ class WholeModel:
     def drives(self, excitation: FloatArray) -> FloatArray:
         """What the input [T, muscles] does to muscles and motor units [T, drives]."""
         given = np.ascontiguousarray(excitation, dtype=np.float64)
+        if len(given) >= TABLE_PAYS:
+            found: FloatArray = self.drive_table.look_up(given)
+            return found
         out = np.zeros((len(given), self.layout.drives))
         self.program.drives(given, self.layout.parameters, self.layout.index, out)
         return out
+
+    @cached_property
+    def drive_table(self) -> DriveTable:
+        """The drives over the excitation, for long inputs."""
+        program = self.program
+        return DriveTable(self.layout, program.unit_drive_c.address, program.muscle_drive_c.address)
 
     def simulate(
         self,
