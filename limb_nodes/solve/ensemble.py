@@ -78,7 +78,7 @@ class Ensemble:
         self.times: FloatArray = np.concatenate([[0.0], asked]) if self.early else np.ascontiguousarray(asked)
         self.inputs = self.prepared(self.variants.base)
         # One method for all: to find how stiff a limb is takes a part of the time of solving it.
-        self.method = METHODS.get(order.method, self.variants.base.suited_method)
+        self.method = self.variants.base.suited_method if order.method == "auto" else order.method
 
     def prepared(self, model: WholeModel) -> tuple[FloatArray, FloatArray]:
         """The input as pieces, and the times of its corners."""
@@ -91,9 +91,8 @@ class Ensemble:
             model = self.variants.model(values)
             order = self.order
             if order.function is not None:
-                method = next(name for name, number in METHODS.items() if number == self.method)
                 return order.function(
-                    model.simulate(order.excitation, order.rate, tolerance=order.tolerance, method=method)
+                    model.simulate(order.excitation, order.rate, tolerance=order.tolerance, method=self.method)
                 )
             same = self.variants.same_drives(model)
             inputs, stops = self.inputs if same else self.prepared(model)

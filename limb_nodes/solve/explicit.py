@@ -8,15 +8,20 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from numba import carray
 
-from limb_nodes.solve.pointer import call
+from limb_nodes.solve.method import BETWEEN, ERROR, STEP, Method
+from limb_nodes.solve.pointer import call, callback
 
 
-@njit(cache=True, error_model="numpy")
-def step(rates, t, h, y, stages, p, k, u, c, stage_y, new_y):
+@callback(*STEP)
+def step(rates, t, h, n, rows, y_, start_rates_, slopes_, stages_, p_, k_, u_, c_, stage_y_, new_y_, matrix_, pivots_):
     """One step of size h; stages[0] holds the rates at t, stages[6] then those at t + h."""
-    n = y.size
+    y, start_rates, stages = carray(y_, (n,)), carray(start_rates_, (n,)), carray(stages_, (7, n))
+    stage_y, new_y = carray(stage_y_, (n,)), carray(new_y_, (n,))
+    p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
+    for i in range(n):
+        stages[0, i] = start_rates[i]
     for i in range(n):
         stage_y[i] = y[i] + h * 0.2 * stages[0, i]
     call(rates, t + 0.2 * h, stage_y, p, k, u, c, stages[1])
@@ -54,11 +59,12 @@ def step(rates, t, h, y, stages, p, k, u, c, stage_y, new_y):
     call(rates, t + h, new_y, p, k, u, c, stages[6])
 
 
-@njit(cache=True, error_model="numpy")
-def error_norm(h, y, new_y, stages, scale, tolerance):
+@callback(*ERROR)
+def error_norm(h, tolerance, n, y_, new_y_, stages_, scale_, found):
     """Largest estimated error over its tolerance."""
+    y, new_y, stages, scale = carray(y_, (n,)), carray(new_y_, (n,)), carray(stages_, (7, n)), carray(scale_, (n,))
     worst = 0.0
-    for i in range(y.size):
+    for i in range(n):
         error = h * (
             71.0 / 57600.0 * stages[0, i]
             - 71.0 / 16695.0 * stages[2, i]
@@ -69,17 +75,19 @@ def error_norm(h, y, new_y, stages, scale, tolerance):
         )
         size = max(scale[i], abs(y[i]), abs(new_y[i]))
         ratio = abs(error) / (tolerance * size)
-        if not math.isfinite(ratio):
-            return ratio
-        worst = max(worst, ratio)
-    return worst
+        if not ratio <= worst:
+            worst = ratio
+        if not math.isfinite(worst):
+            break
+    found[0] = worst
 
 
-@njit(cache=True, error_model="numpy")
-def interpolate(part, h, y, new_y, stages, out):
+@callback(*BETWEEN)
+def interpolate(part, h, n, y_, new_y_, stages_, out):
     """State at t + part h, 0 <= part <= 1, of fourth order."""
+    y, new_y, stages = carray(y_, (n,)), carray(new_y_, (n,)), carray(stages_, (7, n))
     rest = 1.0 - part
-    for i in range(y.size):
+    for i in range(n):
         difference = new_y[i] - y[i]
         bend = h * stages[0, i] - difference
         twist = difference - h * stages[6, i] - bend
@@ -92,3 +100,6 @@ def interpolate(part, h, y, new_y, stages, out):
             + 69997945.0 / 29380423.0 * stages[6, i]
         )
         out[i] = y[i] + part * (difference + rest * (bend + part * (twist + rest * fourth)))
+
+
+EXPLICIT = Method(step, error_norm, interpolate)

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from numba import carray, njit
 
-from limb_nodes.solve.pointer import call
+from limb_nodes.solve.method import BETWEEN, ERROR, STEP, Method
+from limb_nodes.solve.pointer import call, callback
 
 
 @njit(cache=True, error_model="numpy")
@@ -52,16 +53,18 @@ def solve(n, matrix, pivots, right):
         right[i] /= matrix[i, i]
 
 
-@njit(cache=True, error_model="numpy")
-def step(rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots):
+@callback(*STEP)
+def step(rates, t, h, n, rows, y_, start_rates_, slopes_, stages_, p_, k_, u_, c_, stage_y_, new_y_, matrix_, pivots_):
     """One step of size h; stages [6] holds the increments, the last of them the estimated error.
 
     start_rates: at t. slopes: what the program's `jacobian` gives at t.
     """
-    n = y.size
+    y, start_rates, s = carray(y_, (n,)), carray(start_rates_, (n,)), carray(stages_, (7, n))
+    stage_y, new_y = carray(stage_y_, (n,)), carray(new_y_, (n,))
+    p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
+    slopes, matrix, pivots = carray(slopes_, (n * n + n,)), carray(matrix_, (n, n)), carray(pivots_, (n,))
     factor(n, h, slopes, matrix, pivots)
     by_time = slopes[n * n :]
-    s = stages
     for i in range(n):
         s[0, i] = start_rates[i] + 0.25 * h * by_time[i]
     solve(n, matrix, pivots, s[0])
@@ -117,23 +120,26 @@ def step(rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y
         new_y[i] = stage_y[i] + s[5, i]
 
 
-@njit(cache=True, error_model="numpy")
-def error_norm(y, new_y, stages, scale, tolerance):
+@callback(*ERROR)
+def error_norm(h, tolerance, n, y_, new_y_, stages_, scale_, found):
     """Largest estimated error over its tolerance."""
+    y, new_y, stages, scale = carray(y_, (n,)), carray(new_y_, (n,)), carray(stages_, (7, n)), carray(scale_, (n,))
     worst = 0.0
-    for i in range(y.size):
+    for i in range(n):
         ratio = abs(stages[5, i]) / (tolerance * max(scale[i], abs(y[i]), abs(new_y[i])))
-        if not math.isfinite(ratio):
-            return ratio
-        worst = max(worst, ratio)
-    return worst
+        if not ratio <= worst:
+            worst = ratio
+        if not math.isfinite(worst):
+            break
+    found[0] = worst
 
 
-@njit(cache=True, error_model="numpy")
-def interpolate(part, y, new_y, stages, out):
+@callback(*BETWEEN)
+def interpolate(part, h, n, y_, new_y_, stages_, out):
     """State at t + part h, 0 <= part <= 1, of third order."""
+    y, new_y, stages = carray(y_, (n,)), carray(new_y_, (n,)), carray(stages_, (7, n))
     rest = 1.0 - part
-    for i in range(y.size):
+    for i in range(n):
         bend = (
             10.12623508344586 * stages[0, i]
             - 7.487995877610167 * stages[1, i]
@@ -149,3 +155,6 @@ def interpolate(part, y, new_y, stages, out):
             - 6.594389125716872 * stages[4, i]
         )
         out[i] = rest * y[i] + part * (new_y[i] + rest * (bend + part * twist))
+
+
+IMPLICIT = Method(step, error_norm, interpolate)

@@ -11,15 +11,10 @@ import math
 import numpy as np
 from numba import njit, types
 
-from limb_nodes.solve import explicit, implicit
-from limb_nodes.solve.pointer import call
+from limb_nodes.solve.pointer import call, f8, i8, invoke
 
-f8, i8 = types.float64, types.int64
 vector, integers, table = f8[::1], i8[::1], f8[:, ::1]
-explicit_step, explicit_error, explicit_between = explicit.step, explicit.error_norm, explicit.interpolate
-implicit_step, implicit_error, implicit_between = implicit.step, implicit.error_norm, implicit.interpolate
 
-EXPLICIT, IMPLICIT = 0, 1
 DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2, 3
 # Joints within this distance (rad) of a limit are on it.
 TOUCH = 1e-12
@@ -104,14 +99,18 @@ def lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy):
 
 
 @njit(cache=True, error_model="numpy")
-def take_step(method, rates, t, h, y, stages, slopes, p, k, u, c, stage_y, new_y, matrix, pivots, start_rates):
-    """One step of size h by either method; start_rates and slopes are those at t."""
-    if method == IMPLICIT:
-        implicit_step(rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
-    else:
-        for i in range(y.size):
-            stages[0, i] = start_rates[i]
-        explicit_step(rates, t, h, y, stages, p, k, u, c, stage_y, new_y)
+def take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots):
+    """One step of size h by the method's function; start_rates and slopes are those at t."""
+    invoke(
+        step, rates, t, h, y.size, u.shape[0], y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def copy(source, target):
+    """Copy the numbers of an array [n]."""
+    for i in range(source.size):
+        target[i] = source[i]
 
 
 @njit(types.void(i8, vector, vector, integers, table, vector, vector, table), cache=True, error_model="numpy")
@@ -131,7 +130,7 @@ def difference_slopes(rates, y, p, k, u, c, scale, out):
 
 
 SIGNATURE = types.int64(
-    i8,
+    integers,
     i8,
     i8,
     i8,
@@ -193,9 +192,11 @@ def integrate(
         read at the start where it is positive.
     """
     n = y.size
+    step, error_of, between = method[0], method[1], method[2]
+    found = np.empty(1)
     stages = np.empty((7, n))
     stage_y, new_y, start_rates = np.empty(n), np.empty(n), np.empty(n)
-    stiff = method == IMPLICIT
+    stiff = jacobian != 0
     slopes = np.empty(n * (n + 1) if stiff else 0)
     matrix = np.empty((n, n) if stiff else (0, 0))
     pivots = np.empty(n if stiff else 0, dtype=np.int64)
@@ -205,7 +206,7 @@ def integrate(
     t = start
     row, stop = 0, 0
     while row < times.size and times[row] <= start:
-        out[row] = y
+        copy(y, out[row])
         row += 1
     if joints > 0:
         lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, start_rates)
@@ -238,27 +239,10 @@ def integrate(
             call(jacobian, t, y, p, k, u, c, slopes)
             fresh = True
         take_step(
-            method,
-            rates,
-            t,
-            h,
-            y,
-            stages,
-            slopes,
-            p,
-            k,
-            u,
-            c,
-            stage_y,
-            new_y,
-            matrix,
-            pivots,
-            start_rates,
+            step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
         )
-        if stiff:
-            error = implicit_error(y, new_y, stages, scale, tolerance)
-        else:
-            error = explicit_error(h, y, new_y, stages, scale, tolerance)
+        invoke(error_of, h, tolerance, n, y, new_y, stages, scale, found)
+        error = found[0]
         if not error <= 1.0:
             if not math.isfinite(error):
                 if h < 1e-12:
@@ -275,44 +259,14 @@ def integrate(
             if part > 0.0:
                 # The ends of a step do not tell of a touch in between: look where the joint turns.
                 take_step(
-                    method,
-                    rates,
-                    t,
-                    part * h,
-                    y,
-                    stages,
-                    slopes,
-                    p,
-                    k,
-                    u,
-                    c,
-                    stage_y,
-                    new_y,
-                    matrix,
-                    pivots,
-                    start_rates,
+                    step, rates, t, part * h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
                 )
                 if overshoot(new_y, limits, joints, locked)[1] > TOUCH:
                     h = part * h
                     clipped = False
                 else:
                     take_step(
-                        method,
-                        rates,
-                        t,
-                        h,
-                        y,
-                        stages,
-                        slopes,
-                        p,
-                        k,
-                        u,
-                        c,
-                        stage_y,
-                        new_y,
-                        matrix,
-                        pivots,
-                        start_rates,
+                        step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
                     )
             joint, value = overshoot(new_y, limits, joints, locked)
             if value > TOUCH:
@@ -335,22 +289,7 @@ def integrate(
                 part = short_value / (short_value - long_value)
                 h = short + min(0.99, max(0.01, part)) * (long - short)
                 take_step(
-                    method,
-                    rates,
-                    t,
-                    h,
-                    y,
-                    stages,
-                    slopes,
-                    p,
-                    k,
-                    u,
-                    c,
-                    stage_y,
-                    new_y,
-                    matrix,
-                    pivots,
-                    start_rates,
+                    step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
                 )
                 if event == 1:
                     joint, value = overshoot(new_y, limits, joints, locked)
@@ -370,14 +309,10 @@ def integrate(
                     break
         while row < times.size and times[row] <= t + h * (1.0 + 1e-12):
             part = min(1.0, (times[row] - t) / h)
-            if stiff:
-                implicit_between(part, y, new_y, stages, out[row])
-            else:
-                explicit_between(part, h, y, new_y, stages, out[row])
+            invoke(between, part, h, n, y, new_y, stages, out[row])
             row += 1
         t = barrier if clipped and event == 0 else t + h
-        for i in range(n):
-            y[i] = new_y[i]
+        copy(new_y, y)
         progress[0] += 1
         fresh = False
         if event == 1:
@@ -403,10 +338,9 @@ def integrate(
         if event != 0 or stiff:
             call(rates, t, y, p, k, u, c, start_rates)
         else:
-            for i in range(n):
-                start_rates[i] = stages[6, i]
+            copy(stages[6], start_rates)
     while row < times.size:
-        out[row] = y
+        copy(y, out[row])
         row += 1
     progress[2] = t
     progress[3] = h

@@ -22,20 +22,47 @@ SIGNATURE = types.void(f8, numbers, numbers, whole_numbers, numbers, i8, numbers
 
 
 class Callback:
-    """A function of a program that is compiled when its address is first asked for."""
+    """A function that is compiled, or loaded, when its address is first asked for."""
 
-    def __init__(self, function: Callable[..., None]) -> None:
+    def __init__(self, function: Callable[..., None], signature: Any = SIGNATURE) -> None:
         self.function = function
+        self.signature = signature
 
     @cached_property
     def compiled(self) -> Any:
         """The compiled function, kept on disk between processes."""
-        return cfunc(SIGNATURE, cache=True, error_model="numpy")(self.function)
+        return cfunc(self.signature, cache=True, error_model="numpy")(self.function)
 
     @property
     def address(self) -> int:
         """Where the compiled function is."""
         return int(self.compiled.address)
+
+
+def callback(*arguments: Any) -> Callable[[Callable[..., None]], Callback]:
+    """Makes a `Callback` of a function with arguments of other types."""
+    return lambda function: Callback(function, types.void(*arguments))
+
+
+@intrinsic
+def invoke(typingctx, address, *arguments):
+    """Call the function at `address` with numbers, and for each array with where its numbers are."""
+    signature = types.none(address, types.StarArgTuple(arguments))
+
+    def generate(context, builder, signature, given):
+        kinds, values = [], []
+        tuple_type = signature.args[1]
+        for index, kind in enumerate(tuple_type):
+            value = builder.extract_value(given[1], index)
+            if isinstance(kind, types.Array):
+                value = context.make_array(kind)(context, builder, value).data
+            kinds.append(value.type)
+            values.append(value)
+        function = builder.inttoptr(given[0], ir.FunctionType(ir.VoidType(), kinds).as_pointer())
+        builder.call(function, values)
+        return context.get_dummy_value()
+
+    return signature, generate
 
 
 @intrinsic

@@ -13,7 +13,8 @@ import numpy as np
 
 from limb_nodes.model.layout import FloatArray
 from limb_nodes.model.limb import Limb
-from limb_nodes.solve.integrate import DONE, EXPLICIT, integrate
+from limb_nodes.solve.explicit import EXPLICIT
+from limb_nodes.solve.integrate import DONE, integrate
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import bent, straight
 from limb_nodes.solve.small import hold, predict, same
@@ -123,7 +124,7 @@ class MuscleStepper:
         self._progress[:3] = 0.0
         self._progress[3] = period
         status = integrate(
-            EXPLICIT,
+            EXPLICIT.addresses,
             program.muscle_rates_c.address,
             0,
             0,
@@ -237,16 +238,17 @@ class LimbStepper:
         """Advance by `period` (s) under torque and slopes [4, n]. Raises SolveError."""
         hold(torque, self._state, self._predicted, period, self._torque)
         program, layout, n = self.model.program, self.model.layout, self.joints
+        limited = self.model.limited
         locked = self._context[program.LOCKED : program.LOCKED + n]
         held = locked.copy()
         self._progress[:3] = 0.0
         self._progress[3] = period
         status = integrate(
-            EXPLICIT,
+            EXPLICIT.addresses,
             program.limb_rates_c.address,
             0,
-            program.limb_reactions_c.address,
-            program.strike_c.address,
+            program.limb_reactions_c.address if limited else 0,
+            program.strike_c.address if limited else 0,
             0.0,
             period,
             self._state,
@@ -257,7 +259,7 @@ class LimbStepper:
             layout.index,
             self._torque,
             self._context,
-            n,
+            n if limited else 0,
             self.model.limit_offset,
             program.LOCKED,
             NO_TIMES,

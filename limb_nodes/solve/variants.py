@@ -126,7 +126,7 @@ class Variants:
         """A model with the program of the base."""
         model = copy.copy(self.base)
         # What has been found for the base does not hold for its variants.
-        for name in ("suited_method", "drive_table"):
+        for name in ("suited_method", "drive_table", "limited"):
             model.__dict__.pop(name, None)
         model.limb, model.layout = limb, layout
         return model

@@ -13,10 +13,10 @@ from limb_nodes.model.layout import FloatArray, Layout, build_layout
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve.compile import compiled
 from limb_nodes.solve.drive_table import DriveTable
+from limb_nodes.solve.explicit import EXPLICIT
+from limb_nodes.solve.implicit import IMPLICIT
 from limb_nodes.solve.integrate import (
     DONE,
-    EXPLICIT,
-    IMPLICIT,
     NOT_FINITE,
     STEP_TOO_SMALL,
     TOO_MANY_STEPS,
@@ -135,9 +135,14 @@ class WholeModel:
         return float(np.abs(np.linalg.eigvals(slopes)).max())
 
     @cached_property
-    def suited_method(self) -> int:
+    def suited_method(self) -> str:
         """The implicit method where stability would hold the explicit one to small steps."""
-        return IMPLICIT if self.stiffness() > STIFF else EXPLICIT
+        return "implicit" if self.stiffness() > STIFF else "explicit"
+
+    @cached_property
+    def limited(self) -> bool:
+        """Whether a joint has a limit."""
+        return any(segment.joint_range is not None for segment in self.limb.segments)
 
     def drives(self, excitation: FloatArray) -> FloatArray:
         """What the input [T, muscles] does to muscles and motor units [T, drives]."""
@@ -179,7 +184,7 @@ class WholeModel:
         samples = self.drives(excitation)
         inputs = pieces(samples)
         context = self.context(0.0, period)
-        states, steps = self.solve(times, inputs, kinks(samples, period), context, tolerance, METHODS.get(method))
+        states, steps = self.solve(times, inputs, kinks(samples, period), context, tolerance, method)
         n, layout = self.layout.joints, self.layout
         shown = len(times) if observe else 0
         acceleration = np.empty((shown, n))
@@ -216,24 +221,24 @@ class WholeModel:
         stops: FloatArray,
         context: FloatArray,
         tolerance: float,
-        method: int | None,
+        method: str,
     ) -> tuple[FloatArray, tuple[int, int]]:
         """States [T, states] at given times, and the accepted and rejected steps.
 
-        inputs: pieces of the drives. stops: times of corners. method: None chooses by `stiffness`.
+        inputs: pieces of the drives. stops: times of corners. method: as for `simulate`.
         Raises SolveError.
         """
         state = self.initial_state()
         out = np.empty((len(times), state.size))
         progress = np.zeros(4)
-        chosen = self.suited_method if method is None else method
-        layout, program = self.layout, self.program
+        chosen = METHODS[self.suited_method if method == "auto" else method]
+        layout, program, limited = self.layout, self.program, self.limited
         status = integrate(
-            chosen,
+            chosen.addresses,
             program.rates_c.address,
-            program.jacobian_c.address if chosen == IMPLICIT else 0,
-            program.reactions_c.address,
-            program.strike_c.address,
+            program.jacobian_c.address if chosen is IMPLICIT else 0,
+            program.reactions_c.address if limited else 0,
+            program.strike_c.address if limited else 0,
             times[0],
             times[-1],
             state,
@@ -244,7 +249,7 @@ class WholeModel:
             layout.index,
             inputs,
             context,
-            layout.joints,
+            layout.joints if limited else 0,
             self.limit_offset,
             program.LOCKED,
             stops,
