@@ -22,7 +22,7 @@ NODES = 8
 # Halvings of the whole range before a piece that no polynomial fits is searched for a corner.
 SEARCH_DEPTH = 6
 LEAST_WIDTH = 1e-6
-MOST_PIECES = 20_000
+MOST_PIECES = 4_000
 BUCKETS = 1024
 _NODES = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
 _TO_POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))
@@ -38,7 +38,9 @@ def piece(drive, owner, p, k, first, last, left, right, scratch, coefficients):
     """
     width = last - first
     middle, half = 0.5 * (left + right), 0.5 * (right - left)
-    coefficients[:] = 0.0
+    for j in range(width):
+        for power in range(NODES):
+            coefficients[j, power] = 0.0
     for node in range(NODES):
         call(drive, middle + half * _NODES[node], owner, p, k, _NO_TABLE, scratch, scratch)
         for j in range(width):
@@ -60,15 +62,15 @@ def piece(drive, owner, p, k, first, last, left, right, scratch, coefficients):
 @njit(cache=True, error_model="numpy", nogil=True)
 def corner(drive, owner, p, k, first, last, left, right, scratch):
     """The place between left and right where drives jump or bend most, to the next number."""
-    width = last - first
-    values = np.empty((5, width))
+    values = np.empty((5, last - first))
     while True:
         step = 0.25 * (right - left)
         for i in range(5):
             call(drive, left + i * step, owner, p, k, _NO_TABLE, scratch, scratch)
-            values[i] = scratch[first:last]
+            for j in range(last - first):
+                values[i, j] = scratch[first + j]
         before = after = 0.0
-        for j in range(width):
+        for j in range(last - first):
             before = max(before, abs(values[0, j] - 2.0 * values[1, j] + values[2, j]))
             after = max(after, abs(values[2, j] - 2.0 * values[3, j] + values[4, j]))
         middle = left + 2.0 * step
@@ -81,67 +83,65 @@ def corner(drive, owner, p, k, first, last, left, right, scratch):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def corners_of(drive, owner, p, k, first, last, scratch, found):
-    """Append to `found` the places where the drives of one owner jump or bend."""
-    coefficients = np.empty((last - first, NODES))
-    waiting = [(0.0, 1.0, 0)]
-    while len(waiting) > 0:
-        left, right, depth = waiting.pop()
-        if piece(drive, owner, p, k, first, last, left, right, scratch, coefficients) <= TOLERANCE:
-            continue
-        if depth < SEARCH_DEPTH:
-            middle = 0.5 * (left + right)
-            waiting.append((left, middle, depth + 1))
-            waiting.append((middle, right, depth + 1))
-        else:
-            found.append(corner(drive, owner, p, k, first, last, left, right, scratch))
-    return 0
+def find_corners(drive, units, p, k, first, last, scratch, coefficients, found):
+    """Fill found with the places where the drives of single units jump or bend; how many there are."""
+    owner = np.zeros(1)
+    depth, count = SEARCH_DEPTH, 0
+    for unit in units:
+        owner[0] = unit
+        # The cells of all depths in order: a cell at `at` of depth d, then its halves.
+        level, at = 0, 0
+        while level >= 0:
+            size = 1.0 / (1 << level)
+            left, right = at * size, (at + 1) * size
+            smooth = piece(drive, owner, p, k, first, last, left, right, scratch, coefficients) <= TOLERANCE
+            if not smooth and level < depth:
+                level, at = level + 1, 2 * at
+                continue
+            if not smooth and count < found.size:
+                found[count] = corner(drive, owner, p, k, first, last, left, right, scratch)
+                count += 1
+            while level >= 0 and at % 2 == 1:
+                level, at = level - 1, at // 2
+            level, at = (level, at + 1) if level > 0 else (-1, 0)
+    return count
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def tabulate(unit_drive, muscle_drive, muscle, units, p, k, first, last, size):
-    """Edges [pieces + 1], coefficients [pieces, last - first, NODES] and the first piece of each bucket.
+def fit(drive, muscle, breaks, tolerance, p, k, first, last, scratch, edges, table):
+    """Fill edges [pieces + 1] and table [pieces, last - first, NODES] between breaks; how many pieces there are.
 
-    Coefficients are NaN where no polynomial will do. units: numbers of the muscle's units.
-    size: number of all drives.
+    The coefficients are NaN where no polynomial will do.
     """
-    scratch, owner = np.zeros(size), np.zeros(1)
-    found = [0.0, 1.0]
-    for unit in units:
-        owner[0] = unit
-        corners_of(unit_drive, owner, p, k, first, last, scratch, found)
-    breaks = np.unique(np.array(found))
-    owner[0] = muscle
-    coefficients = np.empty((last - first, NODES))
-    lefts, taken = [0.0], [coefficients.copy()]
-    lefts.clear()
-    taken.clear()
-    waiting = [(breaks[i], breaks[i + 1]) for i in range(breaks.size - 2, -1, -1)]
-    while len(waiting) > 0:
-        left, right = waiting.pop()
-        error = piece(muscle_drive, owner, p, k, first, last, left, right, scratch, coefficients)
-        if not error <= TOLERANCE * max(1.0, 0.1 * units.size):
-            if right - left > LEAST_WIDTH and len(lefts) + len(waiting) < MOST_PIECES:
-                middle = 0.5 * (left + right)
-                waiting.append((middle, right))
-                waiting.append((left, middle))
-                continue
-            coefficients[:] = np.nan
-        lefts.append(left)
-        taken.append(coefficients.copy())
-    pieces = len(lefts)
-    edges, table = np.empty(pieces + 1), np.empty((pieces, last - first, NODES))
-    for i in range(pieces):
-        edges[i] = lefts[i]
-        table[i] = taken[i]
+    owner = np.full(1, float(muscle))
+    pieces = 0
+    for at in range(breaks.size - 1):
+        left, end = breaks[at], breaks[at + 1]
+        right = end
+        while left < end:
+            error = piece(drive, owner, p, k, first, last, left, right, scratch, table[pieces])
+            if not error <= tolerance:
+                # Pieces are halved from the left; the rest is tried whole again.
+                if right - left > LEAST_WIDTH and pieces < len(table) - breaks.size:
+                    right = 0.5 * (left + right)
+                    continue
+                for j in range(last - first):
+                    table[pieces, j, 0] = np.nan
+            edges[pieces] = left
+            pieces += 1
+            left, right = right, end
     edges[pieces] = 1.0
-    starts = np.empty(BUCKETS, dtype=np.int64)
+    return pieces
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def first_pieces(edges, starts):
+    """Fill starts with the piece in which each bucket begins."""
     at = 0
-    for bucket in range(BUCKETS):
-        while edges[at + 1] <= bucket / BUCKETS:
+    for bucket in range(starts.size):
+        while edges[at + 1] <= bucket / starts.size:
             at += 1
         starts[bucket] = at
-    return edges, table, starts
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -205,18 +205,25 @@ class DriveTable:
         self.muscles: list[MuscleTable] = []
         for muscle in range(layout.muscles):
             first, last = ends[muscle], ends[muscle + 1]
-            found = tabulate(
-                unit_drive,
-                muscle_drive,
-                muscle,
-                np.flatnonzero(owners == muscle),
-                layout.parameters,
-                layout.index,
-                first,
-                last,
-                layout.drives,
-            )
-            self.muscles.append(MuscleTable(*found, first, last))
+            mine = np.flatnonzero(owners == muscle)
+            self.muscles.append(self.tabulated(muscle, mine, first, last, unit_drive, muscle_drive))
+
+    def tabulated(
+        self, muscle: int, units: IntArray, first: int, last: int, unit_drive: int, muscle_drive: int
+    ) -> MuscleTable:
+        """The table of one muscle and its units."""
+        p, k = self._layout.parameters, self._layout.index
+        scratch, coefficients = np.zeros(self._layout.drives), np.empty((last - first, NODES))
+        found = np.empty(MOST_PIECES // 2)
+        count = find_corners(unit_drive, units, p, k, first, last, scratch, coefficients, found)
+        breaks = np.unique(np.concatenate([[0.0, 1.0], found[:count]]))
+        edges, table = np.empty(MOST_PIECES + 1), np.empty((MOST_PIECES, last - first, NODES))
+        # Rounding grows with the number of units that are summed.
+        tolerance = TOLERANCE * max(1.0, 0.1 * units.size)
+        pieces = fit(muscle_drive, muscle, breaks, tolerance, p, k, first, last, scratch, edges, table)
+        starts = np.empty(BUCKETS, dtype=np.int64)
+        first_pieces(edges, starts)
+        return MuscleTable(edges[: pieces + 1].copy(), table[:pieces].copy(), starts, first, last)
 
     def look_up(self, excitation: FloatArray) -> FloatArray:
         """Drives [T, drives] of excitations [T, muscles]."""
