@@ -43,8 +43,8 @@ def write_table(
         start, dtype, _ = layout.numbers[name]
         put(rows, start, np.asarray(values).astype(dtype))
     whole, size = rows.tobytes(), len(data)
-    for row, stamp in enumerate(stamps.tolist()):
-        writer.write_raw(topic, stamp, whole[row * size : (row + 1) * size], msgtype)
+    messages = (whole[start : start + size] for start in range(0, len(whole), size))
+    writer.write_many(topic, zip(stamps.tolist(), messages, strict=True), msgtype)
 
 
 def example(msgtype: str, name: str, value: Any) -> Any:

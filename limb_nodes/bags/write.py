@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
@@ -119,6 +119,18 @@ class BagWriter:
         connection = self._connections.get(topic) or self._connect(topic, msgtype)
         self._pending.append((connection, stamp_ns, data))
         self.counts[connection.topic] += 1
+        self._pass_on()
+
+    def write_many(self, topic: str, messages: Iterable[tuple[int, bytes | memoryview]], msgtype: str) -> None:
+        """Write serialised messages of a topic: pairs of what `write_raw` takes as stamp_ns and data."""
+        connection = self._connections.get(topic) or self._connect(topic, msgtype)
+        entries = [(connection, stamp_ns, data) for stamp_ns, data in messages]
+        self._pending.extend(entries)
+        self.counts[connection.topic] += len(entries)
+        self._pass_on()
+
+    def _pass_on(self) -> None:
+        """Let the thread write when enough is waiting; wait for it where it falls far behind."""
         if len(self._pending) >= _BATCH and (self._drained is None or self._drained.done()):
             self._submit()
         elif len(self._pending) > _BACKLOG and self._drained is not None:

@@ -14,7 +14,8 @@ import numpy as np
 from numba import njit
 
 from limb_nodes.model.layout import GROUP_INDEX, MUSCLE_INDEX, UNIT_INDEX, FloatArray, IntArray, Layout
-from limb_nodes.solve.pointer import call
+from limb_nodes.solve.inner import inner
+from limb_nodes.solve.pointer import Callback, call
 
 # A drive is at most of the order of 1.
 TOLERANCE = 2e-13
@@ -30,7 +31,7 @@ _CHECKS = np.array([-0.998, -0.29, 0.1, 0.67, 0.998])
 _NO_TABLE = np.empty((1, 1))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@inner
 def piece(drive, owner, p, k, first, last, left, right, scratch, coefficients):
     """Fill coefficients [last - first, NODES], powers of -1 to 1 across the piece; the largest error.
 
@@ -59,7 +60,7 @@ def piece(drive, owner, p, k, first, last, left, right, scratch, coefficients):
     return worst
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@inner
 def corner(drive, owner, p, k, first, last, left, right, scratch):
     """The place between left and right where drives jump or bend most, to the next number."""
     values = np.empty((5, last - first))
@@ -191,12 +192,12 @@ class MuscleTable:
 class DriveTable:
     """The drives of all muscles of a limb.
 
-    unit_drive, muscle_drive: addresses of the program's functions of one unit and of one muscle.
+    unit_drive, muscle_drive: the program's functions of one unit and of one muscle.
     """
 
-    def __init__(self, layout: Layout, unit_drive: int, muscle_drive: int) -> None:
+    def __init__(self, layout: Layout, unit_drive: Callback, muscle_drive: Callback) -> None:
         self._layout = layout
-        self._muscle_drive = muscle_drive
+        self._unit, self._muscle = unit_drive, muscle_drive
         muscles = layout.muscles * len(MUSCLE_INDEX)
         units = layout.index[muscles + layout.groups * len(GROUP_INDEX) :].reshape(-1, len(UNIT_INDEX))
         owners = units[:, UNIT_INDEX.index("muscle")]
@@ -206,21 +207,22 @@ class DriveTable:
         for muscle in range(layout.muscles):
             first, last = ends[muscle], ends[muscle + 1]
             mine = np.flatnonzero(owners == muscle)
-            self.muscles.append(self.tabulated(muscle, mine, first, last, unit_drive, muscle_drive))
+            self.muscles.append(self.tabulated(muscle, mine, first, last))
 
-    def tabulated(
-        self, muscle: int, units: IntArray, first: int, last: int, unit_drive: int, muscle_drive: int
-    ) -> MuscleTable:
+    def tabulated(self, muscle: int, units: IntArray, first: int, last: int) -> MuscleTable:
         """The table of one muscle and its units."""
         p, k = self._layout.parameters, self._layout.index
         scratch, coefficients = np.zeros(self._layout.drives), np.empty((last - first, NODES))
         found = np.empty(MOST_PIECES // 2)
-        count = find_corners(unit_drive, units, p, k, first, last, scratch, coefficients, found)
+        # A muscle's only unit need not be looked at alone.
+        alone = units.size == 1
+        finder, owners = (self._muscle.address, np.array([muscle])) if alone else (self._unit.address, units)
+        count = find_corners(finder, owners, p, k, first, last, scratch, coefficients, found)
         breaks = np.unique(np.concatenate([[0.0, 1.0], found[:count]]))
         edges, table = np.empty(MOST_PIECES + 1), np.empty((MOST_PIECES, last - first, NODES))
         # Rounding grows with the number of units that are summed.
         tolerance = TOLERANCE * max(1.0, 0.1 * units.size)
-        pieces = fit(muscle_drive, muscle, breaks, tolerance, p, k, first, last, scratch, edges, table)
+        pieces = fit(self._muscle.address, muscle, breaks, tolerance, p, k, first, last, scratch, edges, table)
         starts = np.empty(BUCKETS, dtype=np.int64)
         first_pieces(edges, starts)
         return MuscleTable(edges[: pieces + 1].copy(), table[:pieces].copy(), starts, first, last)
@@ -234,7 +236,7 @@ class DriveTable:
                 table.edges,
                 table.coefficients,
                 table.starts,
-                self._muscle_drive,
+                self._muscle.address,
                 muscle,
                 layout.parameters,
                 layout.index,

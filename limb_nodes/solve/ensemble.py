@@ -18,9 +18,8 @@ from limb_nodes.errors import UserError
 from limb_nodes.model.layout import FloatArray
 from limb_nodes.model.limb import Limb
 from limb_nodes.model.load import build_limb
-from limb_nodes.solve.pieces import pieces
 from limb_nodes.solve.variants import Values, Variants
-from limb_nodes.solve.whole import METHODS, TOLERANCE, Movement, WholeModel, kinks
+from limb_nodes.solve.whole import METHODS, TOLERANCE, Movement, WholeModel, prepared
 
 Samples = Iterable[Values] | Mapping[str, FloatArray]
 Task = TypeVar("Task")
@@ -82,8 +81,7 @@ class Ensemble:
 
     def prepared(self, model: WholeModel) -> tuple[FloatArray, FloatArray]:
         """The input as pieces, and the times of its corners."""
-        drives = model.drives(self.order.excitation)
-        return pieces(drives), kinks(drives, self.period)
+        return prepared(model.drives(self.order.excitation), self.period)
 
     def solve(self, values: Values) -> Any:
         """What is asked of a sample, or the exception that kept it from being solved."""

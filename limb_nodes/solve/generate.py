@@ -28,7 +28,8 @@ from limb_nodes.model.layout import (
 from limb_nodes.model.system import BoundEquation
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 
-INLINE = '@njit(error_model="numpy")\n'
+# Never called from Python: entries for that would take a part of the time to compile.
+INLINE = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)\n'
 
 
 class Equations:

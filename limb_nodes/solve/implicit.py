@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 
-from numba import carray, njit
+from numba import carray
 
+from limb_nodes.solve.inner import inner
 from limb_nodes.solve.method import BETWEEN, ERROR, STEP, Method
 from limb_nodes.solve.pointer import call, callback
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def factor(n, h, slopes, matrix, pivots):
     """LU factors of I / (h gamma) - slopes, with partial pivoting."""
     for i in range(n):
@@ -37,7 +38,7 @@ def factor(n, h, slopes, matrix, pivots):
                     matrix[i, j] -= matrix[i, k] * matrix[k, j]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def solve(n, matrix, pivots, right):
     """Solve with the factors, in place."""
     for k in range(n):

@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numba import njit, types
 
+from limb_nodes.solve.inner import inner
 from limb_nodes.solve.pointer import call, f8, i8, invoke
 
 vector, integers, table = f8[::1], i8[::1], f8[:, ::1]
@@ -24,7 +25,7 @@ LEAST_FLIGHT = 1e-9
 MOST_STEPS = 1e6
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def overshoot(new_y, limits, joints, locked):
     """The free joint farthest beyond its limit and how far (rad, negative where none is)."""
     joint, worst = -1, -math.inf
@@ -36,7 +37,7 @@ def overshoot(new_y, limits, joints, locked):
     return joint, worst
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def any_locked(locked):
     """Whether a joint rests on its limit."""
     for flag in locked:
@@ -45,7 +46,7 @@ def any_locked(locked):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def turning_point(y, new_y, limits, joints, locked, h):
     """Part of a step after which a free joint turns back so near its limit that it may have crossed it.
 
@@ -68,7 +69,7 @@ def turning_point(y, new_y, limits, joints, locked, h):
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def pulled_back(reaction, joints, locked):
     """The joint on a limit that is pulled off it most strongly, and the pull (N m, negative where none is)."""
     joint, worst = -1, -math.inf
@@ -78,7 +79,7 @@ def pulled_back(reaction, joints, locked):
     return joint, worst
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy):
     """Lock the joints that start on a limit and press against it."""
     for _ in range(joints):
@@ -98,15 +99,32 @@ def lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy):
             break
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots):
     """One step of size h by the method's function; start_rates and slopes are those at t."""
     invoke(
-        step, rates, t, h, y.size, u.shape[0], y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
+        step,
+        rates,
+        t,
+        h,
+        y.size,
+        u.shape[0],
+        y,
+        start_rates,
+        slopes,
+        stages,
+        p,
+        k,
+        u,
+        c,
+        stage_y,
+        new_y,
+        matrix,
+        pivots,
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def copy(source, target):
     """Copy the numbers of an array [n]."""
     for i in range(source.size):
@@ -238,9 +256,7 @@ def integrate(
         if stiff and not fresh:
             call(jacobian, t, y, p, k, u, c, slopes)
             fresh = True
-        take_step(
-            step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
-        )
+        take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
         invoke(error_of, h, tolerance, n, y, new_y, stages, scale, found)
         error = found[0]
         if not error <= 1.0:
@@ -288,9 +304,7 @@ def integrate(
             for _ in range(60):
                 part = short_value / (short_value - long_value)
                 h = short + min(0.99, max(0.01, part)) * (long - short)
-                take_step(
-                    step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
-                )
+                take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
                 if event == 1:
                     joint, value = overshoot(new_y, limits, joints, locked)
                 else:

@@ -8,6 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+from limb_nodes.model.layout import FloatArray
+from limb_nodes.solve.inner import inner
 
 # A corner: a second difference above this, and this much above those two samples away. A drive is at most 1 and
 # a smooth one sampled well below its period has second differences of the order of the period squared.
@@ -63,7 +67,7 @@ def corners(samples):
     return found
 
 
-@njit(cache=True, nogil=True)
+@inner
 def slope_at(samples, sharp, i, j):
     """Change per interval at sample i of input j: a central difference of fourth order.
 
@@ -86,18 +90,16 @@ def slope_at(samples, sharp, i, j):
 
 
 @njit(cache=True, nogil=True)
-def pieces(samples):
-    """Table [T - 1, 4 n] of pieces through samples [T, n]; one sample is held."""
+def cubics(samples, sharp, table):
+    """Fill table [T - 1, 4 n] with pieces through samples [T, n], of which some are corners [T, n]."""
     count, width = samples.shape
-    if count == 1:
-        return straight(samples[0], samples[0])
-    sharp = corners(samples)
-    table = np.empty((count - 1, 4 * width))
     for j in range(width):
-        right = slope_at(samples, sharp, 0, j)
-        for i in range(count - 1):
+        right = 0.0
+        for i in range(-1, count - 1):
             left = right
             right = slope_at(samples, sharp, i + 1, j)
+            if i < 0:
+                continue
             rise = samples[i + 1, j] - samples[i, j]
             # Beside a corner the straight line is the honest guess for the side that the corner hides,
             # and where an input rests on a bound, a cubic must not swing past it.
@@ -107,4 +109,17 @@ def pieces(samples):
             table[i, 4 * j + 1] = start
             table[i, 4 * j + 2] = 3.0 * rise - 2.0 * start - end
             table[i, 4 * j + 3] = start + end - 2.0 * rise
+
+
+def pieces(samples: FloatArray, sharp: NDArray[np.bool_] | None = None) -> FloatArray:
+    """Table [T - 1, 4 n] of pieces through samples [T, n]; one sample is held.
+
+    sharp: their `corners`, where they are known.
+    """
+    count, width = samples.shape
+    table = np.zeros((max(1, count - 1), 4 * width))
+    if count == 1:
+        table[0, ::4] = samples[0]
+    else:
+        cubics(samples, corners(samples) if sharp is None else sharp, table)
     return table

@@ -158,7 +158,7 @@ class WholeModel:
     def drive_table(self) -> DriveTable:
         """The drives over the excitation, for long inputs."""
         program = self.program
-        return DriveTable(self.layout, program.unit_drive_c.address, program.muscle_drive_c.address)
+        return DriveTable(self.layout, program.unit_drive_c, program.muscle_drive_c)
 
     def simulate(
         self,
@@ -182,9 +182,9 @@ class WholeModel:
         period = 1.0 / rate
         times: FloatArray = np.arange(len(excitation), dtype=np.float64) * period
         samples = self.drives(excitation)
-        inputs = pieces(samples)
+        inputs, stops = prepared(samples, period)
         context = self.context(0.0, period)
-        states, steps = self.solve(times, inputs, kinks(samples, period), context, tolerance, method)
+        states, steps = self.solve(times, inputs, stops, context, tolerance, method)
         n, layout = self.layout.joints, self.layout
         shown = len(times) if observe else 0
         acceleration = np.empty((shown, n))
@@ -272,10 +272,11 @@ class WholeModel:
         )
 
 
-def kinks(samples: FloatArray, period: float) -> FloatArray:
-    """Times of the input samples at which a drive has a corner.
+def prepared(samples: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:
+    """Pieces of sampled drives [T, drives], and the times (s) of the samples at which one has a corner.
 
     A step of high order must not cross such a time: it would not notice.
     """
-    found: FloatArray = np.flatnonzero(corners(samples).any(axis=1)).astype(np.float64) * period
-    return found
+    sharp = corners(samples)
+    rows = np.unique(np.flatnonzero(sharp) // max(1, samples.shape[1]))
+    return pieces(samples, sharp), rows.astype(np.float64) * period
