@@ -14,17 +14,16 @@ import math
 from numba import njit
 
 from limb_nodes.levels.limb import chain
-from limb_nodes.solve.inner import inner
 
 OPTIONS = {"error_model": "numpy", "cache": True}
 
-inertia_coupling = inner(chain.inertia_coupling)
-centrifugal_torque = inner(chain.centrifugal_torque)
-tip_force_torque = inner(chain.tip_force_torque)
-gravity_torque = inner(chain.gravity_torque)
+inertia_coupling = njit(**OPTIONS)(chain.inertia_coupling)
+centrifugal_torque = njit(**OPTIONS)(chain.centrifugal_torque)
+tip_force_torque = njit(**OPTIONS)(chain.tip_force_torque)
+gravity_torque = njit(**OPTIONS)(chain.gravity_torque)
 
 
-@inner
+@njit(**OPTIONS)
 def joint_equations(n, p, q, v, tip_x, tip_y, tip_torque, w):
     """Fill w with the joint inertia matrix [n, n] and, behind it, the torque [n] of motion,
     gravity and load about each joint.
@@ -60,7 +59,7 @@ def joint_equations(n, p, q, v, tip_x, tip_y, tip_torque, w):
             w[k * n + other] += w[k * n + other + 1]
 
 
-@inner
+@njit(**OPTIONS)
 def factor_free(n, locked, w):
     """Cholesky factor of the inertia matrix w [n, n] in place, locked joints left out."""
     for k in range(n):
@@ -80,7 +79,7 @@ def factor_free(n, locked, w):
                 w[k * n + other] = total / w[other * n + other]
 
 
-@inner
+@njit(**OPTIONS)
 def substitute(n, locked, w, right):
     """Solve for right [n] in place with the factor w; 0 for locked joints."""
     for k in range(n):
@@ -105,7 +104,7 @@ def acceleration(n, p, q, v, torque, tip_x, tip_y, tip_torque, locked, out, w):
     substitute(n, locked, w, out)
 
 
-@inner
+@njit(**OPTIONS)
 def reaction(n, p, q, v, torque, tip_x, tip_y, tip_torque, acceleration, out, w):
     """Torque out [n] (N m) that the limit puts on each joint at given accelerations."""
     joint_equations(n, p, q, v, tip_x, tip_y, tip_torque, w)
@@ -135,7 +134,7 @@ def impact(n, p, q, v, locked, w):
         v[k] = momentum[k]
 
 
-@inner
+@njit(**OPTIONS)
 def bias_slopes(n, p, v, acceleration, tip_x, tip_y, w, by_angle, by_velocity):
     """Slopes of (torque of motion, gravity and load) - (inertia matrix) (acceleration).
 

@@ -1,7 +1,7 @@
 """Compiled functions that only other compiled functions call.
 
-They have no entry from Python, which would take a part of the time to compile, and are kept on disk
-as a part of their callers.
+They have no entry from Python, which would take a part of the time to compile: to call one from there
+ends the process. They are kept on disk as a part of their callers.
 """
 
 from __future__ import annotations
