@@ -83,10 +83,10 @@ def error_norm(h, tolerance, n, y_, new_y_, stages_, scale_, found):
 
 
 @callback(*BETWEEN)
-def interpolate(part, h, n, y_, new_y_, stages_, out):
-    """State at t + part h, 0 <= part <= 1, of fourth order."""
+def interpolate(t, h, n, count, times_, y_, new_y_, stages_, out_):
+    """States at times from t to t + h, of fourth order."""
     y, new_y, stages = carray(y_, (n,)), carray(new_y_, (n,)), carray(stages_, (7, n))
-    rest = 1.0 - part
+    times, out = carray(times_, (count,)), carray(out_, (count, n))
     for i in range(n):
         difference = new_y[i] - y[i]
         bend = h * stages[0, i] - difference
@@ -99,7 +99,10 @@ def interpolate(part, h, n, y_, new_y_, stages_, out):
             - 1453857185.0 / 822651844.0 * stages[5, i]
             + 69997945.0 / 29380423.0 * stages[6, i]
         )
-        out[i] = y[i] + part * (difference + rest * (bend + part * (twist + rest * fourth)))
+        for row in range(count):
+            part = min(1.0, (times[row] - t) / h)
+            rest = 1.0 - part
+            out[row, i] = y[i] + part * (difference + rest * (bend + part * (twist + rest * fourth)))
 
 
 EXPLICIT = Method(step, error_norm, interpolate)

@@ -409,6 +409,7 @@ def newton(body: Body, kind: MuscleKind) -> None:
         "high = max(total_fibre_force, total)",
         "step = high - low",
         "step_before = step",
+        "squaring = False",
         "for _ in range(200):",
         "    residual = total - total_fibre_force",
         "    if residual > 0.0:",
@@ -429,6 +430,10 @@ def newton(body: Body, kind: MuscleKind) -> None:
         # Newton's method squares the relative error: behind such a step only rounding is left.
         "    if abs(step) <= (1e-9 if quick else 4e-16) * abs(total_fibre_force):",
         "        break",
+        # Two of its steps tell the factor of the square, and with it the step that would follow.
+        "    if quick and squaring and abs(step) ** 3 <= 1e-14 * abs(total_fibre_force) * step_before * step_before:",
+        "        break",
+        "    squaring = quick",
         *(f"    {line}" for line in evaluate),
     )
 

@@ -136,10 +136,10 @@ def error_norm(h, tolerance, n, y_, new_y_, stages_, scale_, found):
 
 
 @callback(*BETWEEN)
-def interpolate(part, h, n, y_, new_y_, stages_, out):
-    """State at t + part h, 0 <= part <= 1, of third order."""
+def interpolate(t, h, n, count, times_, y_, new_y_, stages_, out_):
+    """States at times from t to t + h, of third order."""
     y, new_y, stages = carray(y_, (n,)), carray(new_y_, (n,)), carray(stages_, (7, n))
-    rest = 1.0 - part
+    times, out = carray(times_, (count,)), carray(out_, (count, n))
     for i in range(n):
         bend = (
             10.12623508344586 * stages[0, i]
@@ -155,7 +155,10 @@ def interpolate(part, h, n, y_, new_y_, stages_, out):
             + 24.76722511418386 * stages[3, i]
             - 6.594389125716872 * stages[4, i]
         )
-        out[i] = rest * y[i] + part * (new_y[i] + rest * (bend + part * twist))
+        for row in range(count):
+            part = min(1.0, (times[row] - t) / h)
+            rest = 1.0 - part
+            out[row, i] = rest * y[i] + part * (new_y[i] + rest * (bend + part * twist))
 
 
 IMPLICIT = Method(step, error_norm, interpolate)

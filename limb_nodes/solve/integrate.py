@@ -321,10 +321,11 @@ def integrate(
                 near = abs(value) <= 1e-13 if event == 1 else False
                 if near or long - short <= 1e-12 * max(1e-3, h):
                     break
+        first = row
         while row < times.size and times[row] <= t + h * (1.0 + 1e-12):
-            part = min(1.0, (times[row] - t) / h)
-            invoke(between, part, h, n, y, new_y, stages, out[row])
             row += 1
+        if row > first:
+            invoke(between, t, h, n, row - first, times[first:], y, new_y, stages, out[first:])
         t = barrier if clipped and event == 0 else t + h
         copy(new_y, y)
         progress[0] += 1

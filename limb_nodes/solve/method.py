@@ -17,8 +17,8 @@ from limb_nodes.solve.pointer import Callback, f8, i8, numbers, whole_numbers
 STEP = (i8, f8, f8, i8, i8, *[numbers] * 5, whole_numbers, *[numbers] * 5, whole_numbers)
 # h, tolerance, n, y, new_y, stages, scale, found
 ERROR = (f8, f8, i8, *[numbers] * 5)
-# part, h, n, y, new_y, stages, out
-BETWEEN = (f8, f8, i8, *[numbers] * 4)
+# t, h, n, count, times, y, new_y, stages, out
+BETWEEN = (f8, f8, i8, i8, *[numbers] * 5)
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Method:
     step: a step of size h from y to new_y; start_rates are those at t, slopes what the program's
         `jacobian` gives there (implicit methods). Leaves its stages in stages [7, n].
     error: found[0], the largest estimated error over its tolerance.
-    between: the state out [n] after `part` of a step, 0 to 1.
+    between: the states out [count, n] at times within the step.
     """
 
     step: Callback

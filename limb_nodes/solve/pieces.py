@@ -48,23 +48,21 @@ def bent(earlier, before, after):
     return found
 
 
-@njit(cache=True, nogil=True)
-def corners(samples):
+def corners(samples: FloatArray) -> NDArray[np.bool_]:
     """Whether each sample [T, n] is a corner [T, n]."""
     count, width = samples.shape
-    found = np.zeros((count, width), dtype=np.bool_)
-    for i in range(1, count - 1):
-        for j in range(width):
-            bend = abs(samples[i + 1, j] - 2.0 * samples[i, j] + samples[i - 1, j])
-            if bend <= LEAST_CORNER:
-                continue
-            beside = 0.0
-            if i >= 3:
-                beside = abs(samples[i - 1, j] - 2.0 * samples[i - 2, j] + samples[i - 3, j])
-            if i + 3 < count:
-                beside = max(beside, abs(samples[i + 3, j] - 2.0 * samples[i + 2, j] + samples[i + 1, j]))
-            found[i, j] = bend > CORNER_RATIO * beside
-    return found
+    found = np.zeros(samples.size, dtype=np.bool_)
+    if count > 2:
+        flat = samples.reshape(-1)
+        # Of all samples, and of two before and behind them: nothing is known of the bends there.
+        bends = np.zeros(samples.size + 4 * width)
+        own = bends[3 * width : -3 * width]
+        np.subtract(flat[2 * width :] + flat[: -2 * width], 2.0 * flat[width:-width], out=own)
+        np.abs(own, out=own)
+        sharp = np.flatnonzero(own > LEAST_CORNER) + 3 * width
+        beside = np.maximum(bends[sharp - 2 * width], bends[sharp + 2 * width])
+        found[sharp - 2 * width] = bends[sharp] > CORNER_RATIO * beside
+    return found.reshape(count, width)
 
 
 @inner
