@@ -344,7 +344,7 @@ def integrate(
             if stiff:
                 growth = 0.9 * max(error, 1e-10) ** -0.25
             else:
-                growth = 0.9 * max(error, 1e-10) ** -0.14 * last_error**0.08
+                growth = 0.9 * math.exp(0.08 * math.log(last_error) - 0.14 * math.log(max(error, 1e-10)))
             last_error = max(error, 1e-4)
             h = h * min(5.0, max(0.2, growth))
             if clipped:

@@ -115,9 +115,10 @@ def pieces(samples: FloatArray, sharp: NDArray[np.bool_] | None = None) -> Float
     sharp: their `corners`, where they are known.
     """
     count, width = samples.shape
-    table = np.zeros((max(1, count - 1), 4 * width))
     if count == 1:
-        table[0, ::4] = samples[0]
-    else:
-        cubics(samples, corners(samples) if sharp is None else sharp, table)
+        held = np.zeros((1, 4 * width))
+        held[0, ::4] = samples[0]
+        return held
+    table = np.empty((count - 1, 4 * width))
+    cubics(samples, corners(samples) if sharp is None else sharp, table)
     return table
