@@ -126,7 +126,8 @@ class Recorder(LimbNode):
             if muscle_stack.get(f"publish_{topic}", True):
                 self.expected[topic] = int(muscle_stack.get("state_every", 1))
         self.writer = BagWriter(self.path, self.run_info(), namespace=self.get_namespace())
-        self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.expected, "/diagnostics")})
+        reports = ("/diagnostics",) if self.mode == "realtime" else ()
+        self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.expected, *reports)})
         for topic, stamp, data in self.buffer:
             self.writer.write_raw(topic, stamp, data, TOPIC_TYPES[topic])
         self.buffer.clear()

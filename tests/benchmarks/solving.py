@@ -31,10 +31,12 @@ def missing(module: str) -> str:
 
 
 def loosest(work: Work, solve: Solve, exponents: range) -> tuple[float, float]:
-    """The loosest tolerance of some powers of ten with the wanted error, and its error; else the best found."""
+    """The loosest tolerance of some powers of ten, and those half-way, with the wanted error, and its error; else
+    the best found.
+    """
     found = []
-    for exponent in exponents:
-        tolerance = 10.0**-exponent
+    for exponent in range(2 * exponents.start, 2 * exponents.stop - 1):
+        tolerance = 10.0 ** (-0.5 * exponent)
         error = work.error(solve(tolerance))
         if error <= WANTED:
             return tolerance, error
@@ -85,15 +87,16 @@ def compare(
     engines: dict[str, Callable[[], Any]] = {}
     errors: dict[str, float] = {}
     notes: dict[str, str] = {}
+    tolerances: dict[str, float] = {}
     apart = work.references[1]
     solves: dict[str, tuple[Solve, range]] = {PRODUCT: (partial(product, work), range(6, 12))}
     solves.update({name: (solve, range(5, 13)) for name, solve in peers.items()})
     for name, (solve, exponents) in solves.items():
         tolerance, errors[name] = loosest(work, solve, exponents)
         engines[name] = partial(solve, tolerance)
-        notes[name] = f"tolerance {tolerance:g}"
-    chosen = float(notes[PRODUCT].split()[1])
-    steps = work.model.simulate(work.excitation, RATE, tolerance=chosen, observe=False).steps
+        notes[name] = f"tolerance {tolerance:.2g}"
+        tolerances[name] = tolerance
+    steps = work.model.simulate(work.excitation, RATE, tolerance=tolerances[PRODUCT], observe=False).steps
     notes[PRODUCT] += f", {steps[0]} steps, reference certain to {apart:.0e}"
     default = f"{PRODUCT}, default"
     engines[default] = partial(product, work, 1e-9)
