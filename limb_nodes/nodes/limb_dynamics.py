@@ -163,12 +163,12 @@ class LimbDynamics(LimbNode):
             return
         if self.started_at is None:
             self.started_at = now - self.ticks.period
-        due = int((now - self.started_at) / self.ticks.period + 0.5)
+        due = self.due(now)
         while self.tick < due and not self.finished:
             tick, rows = self.newest
             if self.tick - tick >= MOST_AHEAD:
                 break
-            # Each tick that came too late, or without its own torque, is one missed deadline.
+            # Each tick that came a whole period late, or without its own torque, is one missed deadline.
             self.missed += self.tick + 1 < due or tick != self.tick
             if tick != self.tick:
                 rows = self.carried(tick, rows)
@@ -176,6 +176,17 @@ class LimbDynamics(LimbNode):
         if now - self.last_report >= REPORT_PERIOD:
             self.last_report = now
             self.report()
+
+    def due(self, now: float) -> int:
+        """How many ticks the wall clock has gone."""
+        assert self.started_at is not None
+        elapsed = (now - self.started_at) / self.ticks.period
+        early = self.tick + 1 - elapsed
+        if 0.0 < early < 0.5:
+            # The timer keeps its phase; when it was taken, the call was late.
+            self.started_at -= early * self.ticks.period
+            return self.tick + 1
+        return int(elapsed)
 
     def carried(self, tick: int, rows: np.ndarray) -> np.ndarray:
         """The torque of an older tick, carried to the current state along its slopes."""
