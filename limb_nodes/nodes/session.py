@@ -40,8 +40,10 @@ ENDING = 10.0
 # How long other nodes of the domain may take to be found (s).
 DISCOVERY = 1.0
 ERROR = "limb: error: "
-# How often to look for another run on the same topics (s).
+# How often to look for another run on the same topics (s), and for how long after the first tick: of two runs
+# the one that came later gives way.
 COMPANY_PERIOD = 0.25
+WATCHED = 5.0
 # Longest run (s).
 LONGEST = 1e9
 
@@ -127,7 +129,7 @@ def run_in_one_process(run: Run, progress: Progress) -> Outcome:
                 shown = recorder.announced
                 progress(shown)
             # Also where nothing gets on: a neighbour's messages may be why.
-            if time.monotonic() - looked > COMPANY_PERIOD:
+            if time.monotonic() - looked > COMPANY_PERIOD and watching(started):
                 looked = time.monotonic()
                 refuse_company(dynamics)
             for node in nodes.values():
@@ -145,6 +147,11 @@ def run_in_one_process(run: Run, progress: Progress) -> Outcome:
     finally:
         close(context, executor, nodes.values())
         gc.unfreeze()
+
+
+def watching(started: float | None) -> bool:
+    """Whether a run that had its first tick then (s), or none yet, looks for others."""
+    return started is None or time.monotonic() - started < WATCHED
 
 
 def refuse_company(node: Any) -> None:
@@ -178,7 +185,8 @@ def run_in_processes(run: Run, progress: Progress) -> Outcome:
         while children["recorder"].status is None and not interrupt.wanted:
             executor.spin_once(timeout_sec=0.05)
             progress(recorded["tick"])
-            refuse_company(observer)
+            if watching(started):
+                refuse_company(observer)
             if started is None and recorded["tick"] > 0:
                 started = time.monotonic()
             for child in children.values():

@@ -31,7 +31,7 @@ TICKED = (
     "sarcomere_state",
 )
 # Longest wait for anything that must happen; only a failing test waits so long.
-DEADLINE = 60.0
+DEADLINE = 120.0
 
 
 def wait_until(

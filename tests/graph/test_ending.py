@@ -140,7 +140,9 @@ def test_a_killed_recorder_leaves_what_can_be_recovered(recorded, bags, tmp_path
 def test_a_second_run_in_the_same_namespace_is_refused(limb, processes, until, tmp_path):
     """Its nodes would take the first run's messages for their own, and the other way round."""
     arguments = ["run", limb, "--activation", "flexor=0.9,extensor=0"]
-    first = processes.limb(*arguments, "--duration", LONG, "--out", tmp_path / "first")
+    # At a rate that leaves the machine to the others.
+    slowly = ["--mode", "realtime", "--rate", "50", "--duration", LONG]
+    first = processes.limb(*arguments, *slowly, "--out", tmp_path / "first")
     until(lambda: bytes_in(tmp_path / "first") or not first.running(), "the first run")
     second = processes.limb(*arguments, "--duration", "1", "--out", tmp_path / "second")
     third = processes.limb(*arguments, "--duration", "0.1", "--out", tmp_path / "third", "--namespace", "other")
