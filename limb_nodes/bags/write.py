@@ -199,9 +199,12 @@ class BagWriter:
 
 
 def refuse_existing(path: Path) -> None:
-    """Raise UserError where a folder that is to be made is there already."""
+    """Raise UserError where a folder that is to be made is there already, or would be within a file."""
     if path.exists() or path.is_symlink():
         raise UserError(f"{path}: exists already; give the name of a folder that does not")
+    above = next(parent for parent in path.absolute().parents if parent.exists())
+    if not above.is_dir():
+        raise UserError(f"{path}: the folder for the bag can't be made: {above} is not a folder")
 
 
 def open_writer(path: Path, *, compressed: bool) -> Writer:
