@@ -11,7 +11,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import zstandard
 from rosbags.interfaces import (
     Connection,
     Qos,
@@ -21,17 +20,15 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.rosbag2.errors import WriterError
-from rosbags.rosbag2.storage_mcap import McapWriter
 from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
 
+from limb_nodes.bags.storage import Storage
 from limb_nodes.bags.types import LATCHED, RUN_INFO, TOPIC_TYPES, absolute, limb_typestore, make_message
 from limb_nodes.errors import UserError
 
 _BATCH = 64
-_ZSTD_LEVEL = 3
 _BACKLOG = 100_000
 
 
@@ -183,15 +180,12 @@ class BagWriter:
 
     def _drain(self) -> None:
         """Write what is waiting; in the writer's thread."""
-        while self._pending:
-            self._writer.write(*self._pending.popleft())
+        pending = self._pending
+        self._writer.write_all(pending.popleft() for _ in iter(pending.__len__, 0))
         now = time.monotonic()
         if now - self._last_flush >= self._flush_period:
             self._last_flush = now
-            storage = _storage(self._writer)
-            if storage.chunk.msgs:
-                storage.close_chunk()
-            storage.bio.flush()
+            self._writer.flush()
 
     def _finish(self) -> None:
         self._drain()
@@ -207,30 +201,17 @@ def refuse_existing(path: Path) -> None:
         raise UserError(f"{path}: the folder for the bag can't be made: {above} is not a folder")
 
 
-def open_writer(path: Path, *, compressed: bool) -> Writer:
+def open_writer(path: Path, *, compressed: bool) -> Storage:
     """Make the folder of a bag and the file in it.
 
     Raises:
         UserError: the folder exists, or can't be made.
     """
     refuse_existing(path)
-    writer = Writer(path, version=Writer.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP)
-    if compressed:
-        writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     try:
-        writer.open()
+        return Storage(path, compressed=compressed)
     except (OSError, WriterError) as error:
         raise UserError(f"{path}: the folder for the bag can't be made: {error}") from None
-    if compressed:
-        # With a checksum, so that readers notice damage; the library's own compressor writes none.
-        _storage(writer).compressor = zstandard.ZstdCompressor(level=_ZSTD_LEVEL, write_checksum=True).compress
-    return writer
-
-
-def _storage(writer: Writer) -> McapWriter:
-    storage = writer.storage
-    assert isinstance(storage, McapWriter)
-    return storage
 
 
 def _qos(*, latched: bool) -> Qos:

@@ -259,7 +259,7 @@ def test_a_full_disk_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         raise OSError(28, "No space left on device")
 
     bag = BagWriter(tmp_path / "run", INFO)
-    monkeypatch.setattr(bag._writer, "write", full)
+    monkeypatch.setattr(bag._writer, "write_all", full)
     message = make_message(TOPIC_TYPES["activation"], 0)
     with pytest.raises(UserError, match="No space left"):
         for k in range(100_000):
