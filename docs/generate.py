@@ -272,7 +272,8 @@ def topic_table(nodes: Sequence[Any]) -> str:
     found: dict[str, dict[str, Any]] = {}
     for role in ("from", "to"):
         for node in nodes:
-            for end in node.publishers if role == "from" else node.subscriptions:
+            # Those that the recorder polls are not among its `subscriptions`.
+            for end in node.publishers if role == "from" else node._subscriptions:
                 topic = end.topic_name if end.topic_name.startswith("/diagnostics") else end.topic_name.lstrip("/")
                 if topic in ("rosout", "parameter_events", "clock"):
                     continue

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,10 @@ from limb_msgs.msg import (
     MuscleState,
     SarcomereState,
 )
+from rclpy.clock import Clock, ClockType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int64, String
 
@@ -45,7 +47,9 @@ TICKED = {
 }
 STATES = ("muscle_state", "motor_unit_state", "sarcomere_state")
 OTHERS = {"emg_envelope": MuscleActivation, "external_load": WrenchStamped, "/diagnostics": DiagnosticArray}
-PROGRESS_EVERY = 32
+# How often the topics of ticks are emptied (s). An executor would take three times as long for each message.
+POLL_PERIOD = 0.005
+STAMP = struct.Struct("<iI")
 # How long to wait for the other nodes to tell their parameters once messages flow (s).
 PATIENCE = 5.0
 
@@ -66,7 +70,7 @@ class Recorder(LimbNode):
         self.path = out
         refuse_existing(Path(out))
         self.writer: BagWriter | None = None
-        self.buffer: list[tuple[str, int, bytes]] = []
+        self.buffer: list[tuple[str, list[tuple[int, bytes]]]] = []
         self.newest = dict.fromkeys(TICKED, -1)
         self.counts = dict.fromkeys(TICKED, 0)
         self.expected = {topic: 1 for topic in TICKED if topic not in STATES}
@@ -76,8 +80,10 @@ class Recorder(LimbNode):
         self.asked: dict[str, AsyncParameterClient] = {}
         self.first_message: float | None = None
         self.progress = self.create_publisher(Int64, "recorder_progress", LATCHED)
-        for topic, kind in TICKED.items():
-            self.listen(kind, topic, partial(self.on_tick, topic), STREAM, raw=True)
+        self.polled = {
+            topic: self.create_subscription(kind, topic, refuse, STREAM, raw=True) for topic, kind in TICKED.items()
+        }
+        self.create_timer(POLL_PERIOD, self.on_poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
         for topic, kind in OTHERS.items():
             self.listen(kind, topic, partial(self.on_other, topic), EVERY, raw=True)
         self.description: str | None = None
@@ -128,8 +134,8 @@ class Recorder(LimbNode):
         self.writer = BagWriter(self.path, self.run_info(), namespace=self.get_namespace())
         reports = ("/diagnostics",) if self.mode == "realtime" else ()
         self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.expected, *reports)})
-        for topic, stamp, data in self.buffer:
-            self.writer.write_raw(topic, stamp, data, TOPIC_TYPES[topic])
+        for topic, messages in self.buffer:
+            self.writer.write_many(topic, messages, TOPIC_TYPES[topic])
         self.buffer.clear()
         if self.description is not None:
             self.write("robot_description", 0, String(data=self.description))
@@ -157,33 +163,58 @@ class Recorder(LimbNode):
             "seed": None,
         }
 
-    def on_tick(self, topic: str, data: bytes) -> None:
-        """Write a serialised message of a tick, unless that tick is there already."""
-        sec, nanosec = struct.unpack_from("<iI", data, 4)
-        stamp = sec * SECOND + nanosec
-        tick = round(stamp / self.ticks.nanoseconds)
-        if tick <= self.newest[topic]:
-            return
-        if self.first_message is None:
-            self.first_message = time.monotonic()
-        self.newest[topic] = tick
-        self.counts[topic] += 1
-        self.put(topic, stamp, data)
-        if topic == "joint_torque":
-            self.last_tick = last_tick(data)
-        if tick % PROGRESS_EVERY == 0 or 0 <= self.last_tick <= tick:
-            self.announce()
+    @property
+    def subscriptions(self) -> Iterator[Subscription[Any]]:
+        """Those of which an executor takes the messages."""
+        polled = self.polled.values()
+        return (subscription for subscription in super().subscriptions if subscription not in polled)
+
+    def on_poll(self) -> None:
+        """Write the ticks that have come; what cannot be written ends the node, in one line."""
+        try:
+            self.poll()
+        except UserError as error:
+            self.failure = self.failure or str(error)
+
+    def poll(self) -> None:
+        """Write the ticks that have come on every topic, and say how far they are complete."""
+        for topic, subscription in self.polled.items():
+            messages = self.take(topic, subscription)
+            if not messages:
+                continue
+            if self.first_message is None:
+                self.first_message = time.monotonic()
+            if topic == "joint_torque":
+                self.last_tick = last_tick(messages[-1][1])
+            self.counts[topic] += len(messages)
+            self.put(topic, messages)
+        self.announce()
+
+    def take(self, topic: str, subscription: Subscription[Any]) -> list[tuple[int, bytes]]:
+        """Stamps and serialised messages of the ticks that are new on a topic."""
+        take, kind, nanoseconds = subscription.handle.take_message, subscription.msg_type, self.ticks.nanoseconds
+        newest, messages = self.newest[topic], []
+        while (taken := take(kind, True)) is not None:
+            data = taken[0]
+            sec, nanosec = STAMP.unpack_from(data, 4)
+            stamp = sec * SECOND + nanosec
+            tick = round(stamp / nanoseconds)
+            if tick > newest:
+                newest = tick
+                messages.append((stamp, data))
+        self.newest[topic] = newest
+        return messages
 
     def on_other(self, topic: str, data: bytes) -> None:
         """Write a message that belongs to no tick at the time of the newest tick."""
-        self.put(topic, max(0, self.newest["joint_states"]) * self.ticks.nanoseconds, data)
+        self.put(topic, [(max(0, self.newest["joint_states"]) * self.ticks.nanoseconds, bytes(data))])
 
-    def put(self, topic: str, stamp: int, data: bytes) -> None:
-        """Hand a message to the bag, or keep it until the bag is open."""
+    def put(self, topic: str, messages: list[tuple[int, bytes]]) -> None:
+        """Hand messages to the bag, or keep them until the bag is open."""
         if self.writer is None:
-            self.buffer.append((topic, stamp, bytes(data)))
+            self.buffer.append((topic, messages))
         else:
-            self.writer.write_raw(topic, stamp, data, TOPIC_TYPES[topic])
+            self.writer.write_many(topic, messages, TOPIC_TYPES[topic])
 
     def announce(self) -> None:
         """Publish the newest tick that is there on every topic."""
@@ -205,12 +236,19 @@ class Recorder(LimbNode):
     def destroy_node(self) -> None:
         """Close the bag, so that it is readable however the run ended."""
         try:
-            if self.writer is None and self.buffer and not self.failure:
-                self.open()
+            if not self.failure:
+                self.poll()
+                if self.writer is None and self.buffer:
+                    self.open()
             if self.writer is not None:
                 self.writer.close()
         finally:
             super().destroy_node()
+
+
+def refuse(message: bytes) -> None:
+    """The callback of a topic that is polled."""
+    raise AssertionError("an executor has taken a message of the recorder")
 
 
 def last_tick(data: bytes) -> int:
