@@ -25,6 +25,15 @@ def type_name(kind: type) -> str:
     return f"{package}/{folder}/{kind.__name__}"
 
 
+def example_in_bytes(example: Any) -> tuple[bytes, Layout]:
+    """A message as bytes, and where its fields are in them."""
+    data = serialize_message(example)
+    layout = Layout(data, limb_typestore())
+    layout.message(type_name(type(example)), "")
+    # What rclpy appends is no part of the message, and readers of bags refuse it.
+    return data[: layout.end], layout
+
+
 class Outgoing:
     """Messages of one publisher.
 
@@ -35,11 +44,8 @@ class Outgoing:
         """example: a message with its names, and sequences of the right length."""
         self.publisher = publisher
         self.nanoseconds = nanoseconds
-        self._data = bytearray(serialize_message(example))
-        layout = Layout(bytes(self._data), limb_typestore())
-        layout.message(type_name(type(example)), "")
-        # What rclpy appends is no part of the message, and readers of bags refuse it.
-        del self._data[layout.end :]
+        data, layout = example_in_bytes(example)
+        self._data = bytearray(data)
         self._stamp = np.frombuffer(self._data, dtype="<u4", count=2, offset=STAMP.start)
         self.values = {
             name: np.frombuffer(
@@ -74,10 +80,7 @@ class Incoming:
 
     def expect(self, example: Any) -> None:
         """Get ready for messages like an example, so that the first takes no longer than the others."""
-        data = serialize_message(example)
-        layout = Layout(data, limb_typestore())
-        layout.message(self._kind, "")
-        self._learn(data[: layout.end])
+        self._use(*example_in_bytes(example))
 
     def read(self, data: bytes) -> int:
         """Take in a message; its tick by its stamp. Raises ValueError if it is no such message."""
@@ -100,6 +103,10 @@ class Incoming:
             layout.message(self._kind, "")
         except (IndexError, UnicodeDecodeError) as problem:
             raise ValueError(f"not a {self._kind}: {problem}") from None
+        self._use(data, layout)
+
+    def _use(self, data: bytes, layout: Layout) -> None:
+        """Take messages to be like this one."""
         self._size = len(data)
         self._constant = [(a, b, data[a:b]) for a, b in joined(layout.constant)]
         self._numbers = {
