@@ -16,6 +16,8 @@ from limb_nodes.nodes.limb_dynamics import LimbDynamics
 from limb_nodes.nodes.muscle_stack import MuscleStack
 
 LONG = "600"
+# Bytes of a bag of well over 100 ticks on every topic.
+ENOUGH = 200_000
 
 
 def bytes_in(bag: Path) -> int:
@@ -54,7 +56,7 @@ def test_an_interrupted_run_leaves_a_readable_bag(options, number, limb, process
     child = processes.limb(
         "run", limb, "--activation", source, "--duration", LONG, "--rate", "1000", "--out", out, *options
     )
-    until(lambda: bytes_in(out) > 30_000 or not child.running(), "a part of the bag on disk")
+    until(lambda: bytes_in(out) > ENOUGH or not child.running(), "a part of the bag on disk")
     nodes = children_of(child.handle.pid)
     assert len(nodes) == (4 if options else 0)
     child.signal(number)
@@ -81,7 +83,7 @@ def test_the_nodes_end_with_a_run_that_is_killed(limb, processes, until, bags, t
     out = tmp_path / "run"
     source = "flexor=0.9,extensor=0"
     child = processes.limb("run", limb, "--activation", source, "--duration", LONG, "--out", out, "--processes")
-    until(lambda: bytes_in(out) > 30_000 or not child.running(), "a part of the bag on disk")
+    until(lambda: bytes_in(out) > ENOUGH or not child.running(), "a part of the bag on disk")
     nodes = children_of(child.handle.pid)
     assert len(nodes) == 4
     child.signal(signal.SIGKILL)
@@ -94,7 +96,7 @@ def test_a_node_that_dies_ends_the_run(limb, processes, until, bags, tmp_path):
     out = tmp_path / "run"
     source = "flexor=0.9,extensor=0"
     child = processes.limb("run", limb, "--activation", source, "--duration", LONG, "--out", out, "--processes")
-    until(lambda: bytes_in(out) > 30_000 or not child.running(), "a part of the bag on disk")
+    until(lambda: bytes_in(out) > ENOUGH or not child.running(), "a part of the bag on disk")
     nodes = children_of(child.handle.pid)
     (muscle_stack,) = (pid for pid in nodes if b"nodes.muscle_stack" in Path(f"/proc/{pid}/cmdline").read_bytes())
     os.kill(muscle_stack, signal.SIGKILL)
@@ -113,7 +115,7 @@ def recorded(bench, limb, processes, until, tmp_path):
     graph.add(ActivationInput, source="flexor=0.9,extensor=0", duration=300.0, **common)
     graph.add(MuscleStack, **common)
     graph.add(LimbDynamics, await_recorder=True, **common)
-    graph.until(lambda: bytes_in(out) > 30_000 or not recorder.running(), "a part of the bag on disk")
+    graph.until(lambda: bytes_in(out) > ENOUGH or not recorder.running(), "a part of the bag on disk")
     return recorder, out
 
 
