@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
     from limb_nodes.solve.whole import TOLERANCE, WholeModel
 
-    model = WholeModel(limb)
+    model = WholeModel(limb, once=True)
     begun = time.perf_counter()
     movement = model.simulate(
         activation.values, args.rate, tolerance=args.tolerance or TOLERANCE, observe=bool(args.out)

@@ -29,8 +29,10 @@ from limb_nodes.solve.pieces import corners, pieces
 ANGLE_SCALE, VELOCITY_SCALE = 1.0, 10.0
 TOLERANCE = 1e-9
 LONGEST_STEP = 0.1
-# Samples from which a table of the drives costs less than their laws.
-TABLE_PAYS = 2000
+# Samples from which a table of the drives costs less than their laws, and from which it does although it has to be
+# compiled for one solve.
+TABLE_PAYS = 2_000
+TABLE_PAYS_ONCE = 1_000_000
 METHODS = {"explicit": EXPLICIT, "implicit": IMPLICIT}
 # Rate (1/s) from which steps that accuracy allows would be unstable with the explicit method.
 STIFF = 2000.0
@@ -70,11 +72,13 @@ class Movement:
 class WholeModel:
     """A limb ready to be solved.
 
+    once: whether for one solve only, before which as little as possible is to be compiled.
     limits: offset of the joint limits in the parameters. state_scale: [2 n + internal states].
     """
 
-    def __init__(self, limb: Limb) -> None:
+    def __init__(self, limb: Limb, *, once: bool = False) -> None:
         self.limb = limb
+        self.table_pays = TABLE_PAYS_ONCE if once else TABLE_PAYS
         self.layout: Layout = build_layout(limb)
         self.program: ModuleType = compiled(self.layout)
         n = self.layout.joints
@@ -147,7 +151,7 @@ class WholeModel:
     def drives(self, excitation: FloatArray) -> FloatArray:
         """What the input [T, muscles] does to muscles and motor units [T, drives]."""
         given = np.ascontiguousarray(excitation, dtype=np.float64)
-        if len(given) >= TABLE_PAYS:
+        if len(given) >= self.table_pays:
             found: FloatArray = self.drive_table.look_up(given)
             return found
         out = np.zeros((len(given), self.layout.drives))

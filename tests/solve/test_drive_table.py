@@ -87,3 +87,15 @@ def test_a_law_that_no_polynomial_follows(tmp_path):
     model = WholeModel(load_limb(tmp_path / "limb.yaml"))
     given = inputs(model)
     np.testing.assert_allclose(model.drives(given), by_law(model, given), rtol=0, atol=2e-12)
+
+
+def test_one_solve_makes_no_table():
+    limb = load_limb(shipped("reference_joint_tendon.yaml"))
+    often, once = WholeModel(limb), WholeModel(limb, once=True)
+    given = inputs(once)
+    np.testing.assert_array_equal(once.drives(given), by_law(often, given))
+    rate, excitation = 1000.0, np.clip(np.sin(np.arange(2 * TABLE_PAYS) / 300.0)[:, np.newaxis] * [1.0, -1.0], 0.0, 1.0)
+    one, other = (model.simulate(excitation, rate, observe=False).angle for model in (often, once))
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-6)
+    assert "drive_table" in vars(often)
+    assert "drive_table" not in vars(once)
