@@ -51,6 +51,7 @@ def draw(record: BenchRecord, title: str, path: Path) -> None:
         lines(panels[4], record.time, angle, "pennation (deg)")
     panels[-1].set_xlabel("time (s)")
     panels[-1].set_xlim(record.time[0], record.time[-1])
+    figure.align_ylabels(panels)
     figure.savefig(path, dpi=130)
 
 
@@ -70,8 +71,13 @@ def lines(axes: Axes, time: FloatArray, series: list[tuple[str, FloatArray]], la
 def frequencies(axes: Axes, record: BenchRecord) -> None:
     """Stimulation frequencies of the motor units."""
     if len(record.unit_names) <= MOST_LINES:
-        for index, (name, colour) in enumerate(zip(record.unit_names, COLOURS, strict=False)):
-            axes.plot(record.time, record.frequency[:, index], color=colour, lw=1.4, label=name)
+        # Units of the same frequency share a line, which would hide all but the last of them.
+        shared: dict[bytes, list[int]] = {}
+        for index in range(len(record.unit_names)):
+            shared.setdefault(record.frequency[:, index].tobytes(), []).append(index)
+        for indices, colour in zip(shared.values(), COLOURS, strict=False):
+            name = ", ".join(record.unit_names[index] for index in indices)
+            axes.plot(record.time, record.frequency[:, indices[0]], color=colour, lw=1.4, label=name)
         dress(axes, "frequency (Hz)", len(record.unit_names) > 1)
     else:
         low, high = record.frequency.min(axis=1), record.frequency.max(axis=1)

@@ -173,7 +173,7 @@ def draw_sorted(axes: Axes, one: Findings) -> None:
             left = start > 0.6 * count
             last = max(start + extent / 2, last + 0.03 * count)
             axes.text(
-                start - 0.01 * count if left else start + extent + 0.01 * count,
+                (start if left else start + extent) - 0.5 + (-0.012 if left else 0.012) * count,
                 last,
                 f"{extent} together ({first})",
                 ha="right" if left else "left",
