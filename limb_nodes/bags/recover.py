@@ -14,7 +14,8 @@ from rosbags.rosbag2 import Writer
 from rosbags.rosbag2.metadata import parse_qos
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from limb_nodes.bags.write import open_writer, refuse_existing
+from limb_nodes.bags.folder import refuse_existing
+from limb_nodes.bags.write import open_writer
 from limb_nodes.errors import UserError
 
 

@@ -24,6 +24,7 @@ from rosbags.rosbag2.errors import WriterError
 from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
 
+from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.bags.storage import Storage
 from limb_nodes.bags.types import LATCHED, RUN_INFO, TOPIC_TYPES, absolute, limb_typestore, make_message
 from limb_nodes.errors import UserError
@@ -190,15 +191,6 @@ class BagWriter:
     def _finish(self) -> None:
         self._drain()
         self._writer.close()
-
-
-def refuse_existing(path: Path) -> None:
-    """Raise UserError where a folder that is to be made is there already, or would be within a file."""
-    if path.exists() or path.is_symlink():
-        raise UserError(f"{path}: exists already; give the name of a folder that does not")
-    above = next(parent for parent in path.absolute().parents if parent.exists())
-    if not above.is_dir():
-        raise UserError(f"{path}: the folder for the bag can't be made: {above} is not a folder")
 
 
 def open_writer(path: Path, *, compressed: bool) -> Storage:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from limb_nodes.bags.emg import EnvelopeOptions, Envelopes, envelopes, write_envelopes
 from limb_nodes.bags.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
+from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.bags.recording import RAW_TOPIC, read_recording
-from limb_nodes.bags.write import refuse_existing
 from limb_nodes.errors import UserError
 
 

@@ -36,7 +36,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Solve, record, print a summary."""
     from limb_nodes.bags.activation import load_activation
-    from limb_nodes.bags.write import refuse_existing
+    from limb_nodes.bags.folder import refuse_existing
     from limb_nodes.model import load_limb, user_sources
 
     limb = load_limb(args.limb)

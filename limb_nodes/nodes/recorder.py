@@ -26,9 +26,10 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Int64, String
 
+from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.bags.types import TOPIC_TYPES
 from limb_nodes.bags.versions import versions
-from limb_nodes.bags.write import BagWriter, refuse_existing
+from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
 from limb_nodes.model import user_sources
 from limb_nodes.nodes.base import NODES, LimbNode

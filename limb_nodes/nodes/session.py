@@ -321,7 +321,7 @@ def recorded_outcome(run: Run, seconds: float, interrupted: bool) -> Outcome:
 def checked(run: Run) -> tuple[Run, int | None]:
     """Check a run before anything is written; the run with absolute paths and its last tick."""
     from limb_nodes.bags.activation import load_activation
-    from limb_nodes.bags.write import refuse_existing
+    from limb_nodes.bags.folder import refuse_existing
     from limb_nodes.model import load_limb
     from limb_nodes.nodes.ticks import Ticks
 
