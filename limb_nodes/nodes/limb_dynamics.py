@@ -26,9 +26,8 @@ from limb_nodes.solve.stepping import LimbStepper
 
 TORQUE_FIELDS = ("torque", "slope_angle", "slope_velocity", "slope_time")
 REMEMBERED = 1000
-# How many ticks the limb goes on with a torque in real time. Farther its slopes say nothing, and muscles that
-# cannot follow would be buried in joint states until some are lost.
-MOST_AHEAD = 50
+# How long the limb goes on with a torque in real time (s). Farther its slopes say nothing.
+MOST_AHEAD = 0.05
 REPORT_PERIOD = 1.0
 
 
@@ -49,6 +48,8 @@ class LimbDynamics(LimbNode):
         self.stepper = LimbStepper(self.limb)
         self.joints = self.limb.joint_names
         self.tick = 0
+        self.most_ahead = max(1, round(MOST_AHEAD / self.ticks.period))
+        self.behind = False
         self.missed = 0
         self.told = 0
         self.recorded = -1
@@ -141,6 +142,8 @@ class LimbDynamics(LimbNode):
         if self.mode == "realtime":
             if self.newest is None or tick > self.newest[0]:
                 self.newest = tick, rows
+            if self.behind:
+                self.catch_up(int(self.elapsed()))
             return
         if tick != self.tick or self.finished:
             return
@@ -151,36 +154,48 @@ class LimbDynamics(LimbNode):
 
     def on_timer(self) -> None:
         """Step as far as the wall clock has gone; what cannot be solved ends the node, in one line."""
-        try:
-            self.catch_up()
-        except UserError as error:
-            self.failure = self.failure or str(error)
-
-    def catch_up(self) -> None:
-        """Step as far as the wall clock has gone, with the newest torque."""
-        now = time.monotonic()
         if self.newest is None or self.finished:
             return
+        now = time.monotonic()
         if self.started_at is None:
             self.started_at = now - self.ticks.period
-        due = self.due(now)
-        while self.tick < due and not self.finished:
-            tick, rows = self.newest
-            if self.tick - tick >= MOST_AHEAD:
-                break
-            # Each tick that came a whole period late, or without its own torque, is one missed deadline.
-            self.missed += self.tick + 1 < due or tick != self.tick
-            if tick != self.tick:
-                rows = self.carried(tick, rows)
-            self.step(rows)
+        try:
+            self.catch_up(self.due())
+        except UserError as error:
+            self.failure = self.failure or str(error)
         if now - self.last_report >= REPORT_PERIOD:
             self.last_report = now
             self.report()
 
-    def due(self, now: float) -> int:
+    def catch_up(self, due: int) -> None:
+        """Step to the tick that is due, with the newest torque.
+
+        A tick on time makes do with the torque of one before. A late one waits for its own: muscles that are behind
+        would answer a movement that went on without them, and throw the limb about.
+        """
+        self.behind = False
+        while self.tick < due and not self.finished:
+            assert self.newest is not None
+            tick, rows = self.newest
+            late = self.tick + 1 < due
+            if tick != self.tick and (late or self.tick - tick >= self.most_ahead):
+                self.behind = True
+                break
+            # Each tick that came a whole period late, or without its own torque, is one missed deadline.
+            self.missed += late or tick != self.tick
+            if tick != self.tick:
+                rows = self.carried(tick, rows)
+            self.step(rows)
+
+    def elapsed(self) -> float:
         """How many ticks the wall clock has gone."""
         assert self.started_at is not None
-        elapsed = (now - self.started_at) / self.ticks.period
+        return (time.monotonic() - self.started_at) / self.ticks.period
+
+    def due(self) -> int:
+        """How many ticks are due when the timer fires."""
+        assert self.started_at is not None
+        elapsed = self.elapsed()
         early = self.tick + 1 - elapsed
         if 0.0 < early < 0.5:
             # The timer keeps its phase; when it was taken, the call was late.
