@@ -249,6 +249,12 @@ class LimbDynamics(LimbNode):
             self.told = self.missed
             self.get_logger().warning(message)
 
+    def destroy_node(self) -> None:
+        """Tell how real time was kept where the run is ended before its last tick."""
+        if self.started_at is not None and not self.finished:
+            self.report()
+        super().destroy_node()
+
 
 main = main_of(LimbDynamics)
 

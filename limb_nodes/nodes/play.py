@@ -27,6 +27,8 @@ TYPE = "limb_msgs/msg/MuscleActivation"
 NAP = 0.05
 # How long the last message may take to arrive (s).
 FAREWELL = 2.0
+# Who is no listener: the recorder, and a node whose name is not known yet, for it may be the recorder.
+NO_LISTENERS = {"recorder", "_NODE_NAME_UNKNOWN_"}
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ def await_listener(node: Node, publisher: Publisher, wait: float, interrupt: Int
     end, topic = time.monotonic() + wait, publisher.topic_name
     while not interrupt.wanted:
         listeners = [info.node_name for info in node.get_subscriptions_info_by_topic(topic)]
-        if set(listeners) - {"recorder"} and publisher.get_subscription_count() >= len(listeners):
+        if set(listeners) - NO_LISTENERS and publisher.get_subscription_count() >= len(listeners):
             return
         if time.monotonic() > end:
             raise UserError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,7 @@ from limb_nodes.model import user_sources
 from limb_nodes.nodes.base import NODES, LimbNode
 from limb_nodes.nodes.qos import EVERY, LATCHED, STREAM
 from limb_nodes.nodes.running import main_of
-from limb_nodes.nodes.ticks import SECOND
+from limb_nodes.nodes.wire import stamp_of
 
 TICKED = {
     "activation": MuscleActivation,
@@ -48,9 +48,8 @@ TICKED = {
 }
 STATES = ("muscle_state", "motor_unit_state", "sarcomere_state")
 OTHERS = {"emg_envelope": MuscleActivation, "external_load": WrenchStamped, "/diagnostics": DiagnosticArray}
-# How often the topics of ticks are emptied (s). An executor would take three times as long for each message.
+# How often the topics are emptied (s). An executor would take three times as long for each message.
 POLL_PERIOD = 0.005
-STAMP = struct.Struct("<iI")
 # How long to wait for the other nodes to tell their parameters once messages flow (s).
 PATIENCE = 5.0
 
@@ -81,12 +80,13 @@ class Recorder(LimbNode):
         self.asked: dict[str, AsyncParameterClient] = {}
         self.first_message: float | None = None
         self.progress = self.create_publisher(Int64, "recorder_progress", LATCHED)
-        self.polled = {
+        self.ticked = {
             topic: self.create_subscription(kind, topic, refuse, STREAM, raw=True) for topic, kind in TICKED.items()
         }
+        self.others = {
+            topic: self.create_subscription(kind, topic, refuse, EVERY, raw=True) for topic, kind in OTHERS.items()
+        }
         self.create_timer(POLL_PERIOD, self.on_poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        for topic, kind in OTHERS.items():
-            self.listen(kind, topic, partial(self.on_other, topic), EVERY, raw=True)
         self.description: str | None = None
         self.listen(String, "robot_description", self.on_description, LATCHED)
         self.asking = self.create_timer(0.05, self.ask)
@@ -167,20 +167,20 @@ class Recorder(LimbNode):
     @property
     def subscriptions(self) -> Iterator[Subscription[Any]]:
         """Those of which an executor takes the messages."""
-        polled = self.polled.values()
+        polled = [*self.ticked.values(), *self.others.values()]
         return (subscription for subscription in super().subscriptions if subscription not in polled)
 
     def on_poll(self) -> None:
-        """Write the ticks that have come; what cannot be written ends the node, in one line."""
+        """Write what has come; what cannot be written ends the node, in one line."""
         try:
             self.poll()
         except UserError as error:
             self.failure = self.failure or str(error)
 
     def poll(self) -> None:
-        """Write the ticks that have come on every topic, and say how far they are complete."""
-        for topic, subscription in self.polled.items():
-            messages = self.take(topic, subscription)
+        """Write what has come on every topic, and say how far the ticks are complete."""
+        for topic, subscription in self.ticked.items():
+            messages = self.new_ticks(topic, taken(subscription))
             if not messages:
                 continue
             if self.first_message is None:
@@ -189,26 +189,24 @@ class Recorder(LimbNode):
                 self.last_tick = last_tick(messages[-1][1])
             self.counts[topic] += len(messages)
             self.put(topic, messages)
+        # After the ticks: what a node says before its last one is there when that one is.
+        now = max(0, self.newest["joint_states"]) * self.ticks.nanoseconds
+        for topic, subscription in self.others.items():
+            if messages := [(now, data) for data in taken(subscription)]:
+                self.put(topic, messages)
         self.announce()
 
-    def take(self, topic: str, subscription: Subscription[Any]) -> list[tuple[int, bytes]]:
+    def new_ticks(self, topic: str, arrived: Iterable[bytes]) -> list[tuple[int, bytes]]:
         """Stamps and serialised messages of the ticks that are new on a topic."""
-        take, kind, nanoseconds = subscription.handle.take_message, subscription.msg_type, self.ticks.nanoseconds
-        newest, messages = self.newest[topic], []
-        while (taken := take(kind, True)) is not None:
-            data = taken[0]
-            sec, nanosec = STAMP.unpack_from(data, 4)
-            stamp = sec * SECOND + nanosec
+        nanoseconds, newest, messages = self.ticks.nanoseconds, self.newest[topic], []
+        for data in arrived:
+            stamp = stamp_of(data)
             tick = round(stamp / nanoseconds)
             if tick > newest:
                 newest = tick
                 messages.append((stamp, data))
         self.newest[topic] = newest
         return messages
-
-    def on_other(self, topic: str, data: bytes) -> None:
-        """Write a message that belongs to no tick at the time of the newest tick."""
-        self.put(topic, [(max(0, self.newest["joint_states"]) * self.ticks.nanoseconds, bytes(data))])
 
     def put(self, topic: str, messages: list[tuple[int, bytes]]) -> None:
         """Hand messages to the bag, or keep them until the bag is open."""
@@ -241,10 +239,17 @@ class Recorder(LimbNode):
                 self.poll()
                 if self.writer is None and self.buffer:
                     self.open()
+        finally:
             if self.writer is not None:
                 self.writer.close()
-        finally:
             super().destroy_node()
+
+
+def taken(subscription: Subscription[Any]) -> Iterator[bytes]:
+    """The serialised messages that have come on a topic that is polled."""
+    take, kind = subscription.handle.take_message, subscription.msg_type
+    while (found := take(kind, True)) is not None:
+        yield found[0]
 
 
 def refuse(message: bytes) -> None:

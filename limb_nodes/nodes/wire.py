@@ -7,6 +7,7 @@ made once, and afterwards only the numbers in them are written or read.
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,13 @@ from limb_nodes.bags.columns import Layout
 from limb_nodes.bags.types import limb_typestore
 from limb_nodes.nodes.ticks import SECOND
 
-STAMP = slice(4, 12)
+STAMP, STAMP_AT = struct.Struct("<iI"), 4
+
+
+def stamp_of(data: bytes) -> int:
+    """The stamp (ns) of a serialised message that begins with a header."""
+    sec, nanosec = STAMP.unpack_from(data, STAMP_AT)
+    return int(sec * SECOND + nanosec)
 
 
 def type_name(kind: type) -> str:
@@ -46,7 +53,7 @@ class Outgoing:
         self.nanoseconds = nanoseconds
         data, layout = example_in_bytes(example)
         self._data = bytearray(data)
-        self._stamp = np.frombuffer(self._data, dtype="<u4", count=2, offset=STAMP.start)
+        self._stamp = np.frombuffer(self._data, dtype="<u4", count=2, offset=STAMP_AT)
         self.values = {
             name: np.frombuffer(
                 self._data, dtype=dtype, count=int(np.prod(shape, dtype=np.int64)), offset=start
@@ -87,9 +94,7 @@ class Incoming:
         if len(data) != self._size or any(data[a:b] != text for a, b, text in self._constant):
             self._learn(data)
         self._data = data
-        sec = int.from_bytes(data[4:8], "little", signed=True)
-        stamp = sec * SECOND + int.from_bytes(data[8:12], "little")
-        return round(stamp / self.nanoseconds)
+        return round(stamp_of(data) / self.nanoseconds)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """A field of the message last read, as an array that must not be kept."""
