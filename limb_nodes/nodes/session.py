@@ -35,7 +35,8 @@ CLASSES = {
     "limb_dynamics": LimbDynamics,
     "recorder": Recorder,
 }
-STARTING = 60.0
+# How long nodes in processes of their own may take to the first tick (s); a slow machine compiles a limb for minutes.
+STARTING = 300.0
 ENDING = 10.0
 # How long other nodes of the domain may take to be found (s).
 DISCOVERY = 1.0
@@ -194,7 +195,7 @@ def run_in_processes(run: Run, progress: Progress) -> Outcome:
                     stop(children)
                     raise UserError(child.complaint())
             if started is None and time.monotonic() - begun > STARTING:
-                raise UserError(f"the nodes did not start within {STARTING:g} s; is another run using the same topics?")
+                raise UserError(f"no tick within {STARTING:g} s; {why_nothing_comes(observer)}")
         ended = time.monotonic()
         stop(children)
         if interrupt.wanted and not Path(run.out).exists():
@@ -205,6 +206,15 @@ def run_in_processes(run: Run, progress: Progress) -> Outcome:
     finally:
         stop(children)
         close(context, executor, [observer])
+
+
+def why_nothing_comes(observer: Any) -> str:
+    """What to look at where a run does not begin."""
+    there = {name for name, where in observer.get_node_names_and_namespaces() if where == observer.get_namespace()}
+    silent = [name for name in NODES if name not in there]
+    if silent:
+        return f"not heard of {', '.join(silent)}: does ROS_AUTOMATIC_DISCOVERY_RANGE let nodes find each other?"
+    return "all nodes are there: is the machine too busy, or another run using the same topics?"
 
 
 class Child:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,6 +24,12 @@ ENOUGH = 200_000
 def bytes_in(bag: Path) -> int:
     """What of a bag is on disk."""
     return sum(path.stat().st_size for path in bag.glob("*.mcap"))
+
+
+def on_disk(bag: Path, child: Any, until: Any) -> None:
+    """Wait until a part of the bag that a process writes is on disk."""
+    until(lambda: bytes_in(bag) > ENOUGH or not child.running(), "a part of the bag on disk")
+    assert child.running(), child.said
 
 
 def children_of(pid: int) -> list[int]:
@@ -56,7 +63,7 @@ def test_an_interrupted_run_leaves_a_readable_bag(options, number, limb, process
     child = processes.limb(
         "run", limb, "--activation", source, "--duration", LONG, "--rate", "1000", "--out", out, *options
     )
-    until(lambda: bytes_in(out) > ENOUGH or not child.running(), "a part of the bag on disk")
+    on_disk(out, child, until)
     nodes = children_of(child.handle.pid)
     assert len(nodes) == (4 if options else 0)
     child.signal(number)
@@ -83,7 +90,7 @@ def test_the_nodes_end_with_a_run_that_is_killed(limb, processes, until, bags, t
     out = tmp_path / "run"
     source = "flexor=0.9,extensor=0"
     child = processes.limb("run", limb, "--activation", source, "--duration", LONG, "--out", out, "--processes")
-    until(lambda: bytes_in(out) > ENOUGH or not child.running(), "a part of the bag on disk")
+    on_disk(out, child, until)
     nodes = children_of(child.handle.pid)
     assert len(nodes) == 4
     child.signal(signal.SIGKILL)
@@ -96,7 +103,7 @@ def test_a_node_that_dies_ends_the_run(limb, processes, until, bags, tmp_path):
     out = tmp_path / "run"
     source = "flexor=0.9,extensor=0"
     child = processes.limb("run", limb, "--activation", source, "--duration", LONG, "--out", out, "--processes")
-    until(lambda: bytes_in(out) > ENOUGH or not child.running(), "a part of the bag on disk")
+    on_disk(out, child, until)
     nodes = children_of(child.handle.pid)
     (muscle_stack,) = (pid for pid in nodes if b"nodes.muscle_stack" in Path(f"/proc/{pid}/cmdline").read_bytes())
     os.kill(muscle_stack, signal.SIGKILL)

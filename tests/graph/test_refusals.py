@@ -10,6 +10,7 @@ import pytest
 from limb_nodes import cli
 from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
+from limb_nodes.nodes import session
 from limb_nodes.nodes.running import run_node
 from limb_nodes.nodes.session import CLASSES
 
@@ -229,3 +230,11 @@ def test_help_names_every_option(capsys):
             cli.main([command, "--help"])
         assert end.value.code == 0
         assert len(re.findall(r"^  --\w+", capsys.readouterr().out, re.MULTILINE)) >= 5
+
+
+def test_nodes_that_cannot_find_each_other(limb, tmp_path, monkeypatch, capfd):
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
+    monkeypatch.setattr(session, "STARTING", 5.0)
+    arguments = ["run", limb, "--activation", "flexor=0.5,extensor=0", "--duration", "1", "--out", str(tmp_path / "run")]
+    assert cli.main([*arguments, "--processes"]) == 2
+    one_line(capfd.readouterr().err, "5 s", *CLASSES, "ROS_AUTOMATIC_DISCOVERY_RANGE")
