@@ -37,7 +37,8 @@ CLASSES = {
 }
 # How long nodes in processes of their own may take to the first tick (s); a slow machine compiles a limb for minutes.
 STARTING = 300.0
-ENDING = 10.0
+# How long they may take to end when asked to: a recorder may have much to write.
+ENDING = 60.0
 # How long other nodes of the domain may take to be found (s).
 DISCOVERY = 1.0
 ERROR = "limb: error: "
