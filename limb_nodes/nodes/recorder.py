@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -52,6 +53,8 @@ OTHERS = {"emg_envelope": MuscleActivation, "external_load": WrenchStamped, "/di
 POLL_PERIOD = 0.005
 # How long to wait for the other nodes to tell their parameters once messages flow (s).
 PATIENCE = 5.0
+# How long to wait for a node's answer before it is asked again (s).
+ASK_AGAIN = 1.0
 
 
 class Recorder(LimbNode):
@@ -77,7 +80,8 @@ class Recorder(LimbNode):
         self.last_tick = -1
         self.announced = -2
         self.parameters: dict[str, dict[str, Any]] = {"recorder": own_parameters(self)}
-        self.asked: dict[str, AsyncParameterClient] = {}
+        self.askers: dict[str, AsyncParameterClient] = {}
+        self.asked: dict[str, float] = {}
         self.first_message: float | None = None
         self.progress = self.create_publisher(Int64, "recorder_progress", LATCHED)
         self.ticked = {
@@ -101,14 +105,18 @@ class Recorder(LimbNode):
     def ask(self) -> None:
         """Ask the other nodes for their parameters until all have told them; then open the bag."""
         present = set(self.get_node_names_and_namespaces())
+        now = time.monotonic()
         for name in NODES:
-            known = name in self.asked or name in self.parameters
-            if not known and (name, self.get_namespace()) in present:
-                client = AsyncParameterClient(self, name)
-                if client.services_are_ready():
-                    self.asked[name] = client
-                    client.list_parameters(callback=partial(self.on_names, name, client))
-        waited = self.first_message is not None and time.monotonic() - self.first_message > PATIENCE
+            if name in self.parameters or (name, self.get_namespace()) not in present:
+                continue
+            if name not in self.askers:
+                self.askers[name] = AsyncParameterClient(self, name)
+            client = self.askers[name]
+            # An answer may be lost: the node is started anew, or has not found the one who asks yet.
+            if now - self.asked.get(name, -math.inf) > ASK_AGAIN and client.services_are_ready():
+                self.asked[name] = now
+                client.list_parameters(callback=partial(self.on_names, name, client))
+        waited = self.first_message is not None and now - self.first_message > PATIENCE
         if set(self.parameters) >= set(NODES) or waited:
             self.asking.cancel()
             try:

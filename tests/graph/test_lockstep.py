@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from limb_nodes.bags.activation import load_activation
 from limb_nodes.bags.read import BagReader
 from limb_nodes.model import load_limb
-from limb_nodes.nodes.session import Run, checked, run_in_one_process, run_in_processes
+from limb_nodes.nodes.session import CLASSES, Run, checked, run_in_one_process, run_in_processes
 from limb_nodes.solve.stepping import LimbStepper, MuscleStepper
 from limb_nodes.solve.whole import WholeModel
 
@@ -24,7 +25,7 @@ def parameters(node: str, limb: str, source: str, out: Path, seconds: float = 0.
     own: dict[str, dict[str, object]] = {
         "activation_input": {"source": source, "duration": seconds},
         "limb_dynamics": {"await_recorder": True},
-        "recorder": {"out": out},
+        "recorder": {"out": str(out)},
     }
     return {"limb": limb, "rate": RATE, **own.get(node, {})}
 
@@ -84,6 +85,26 @@ def test_nodes_started_by_hand_one_after_the_other(reference, limb, waves, bags,
         started[name] = processes.node(name, **parameters(name, limb, waves, out))
         probe.until(lambda name=name: name in probe.probe.get_node_names(), f"{name} in the graph")
     assert [started[name].wait() for name in order] == [0] * 4
+    assert bags.differences(reference, out) == []
+
+
+def test_a_node_that_is_started_anew_before_the_run(reference, limb, waves, bags, processes, bench, tmp_path):
+    """The recorder has asked it for its parameters, and never hears from the one that it asked."""
+    graph, out = bench(), tmp_path / "run"
+    given = {name: parameters(name, limb, waves, out) for name in NODES}
+    first = processes.node("muscle_stack", **given["muscle_stack"])
+    graph.until(lambda: "muscle_stack" in graph.probe.get_node_names(), "muscle_stack")
+    first.signal(signal.SIGSTOP)
+    for name in "activation_input", "limb_dynamics":
+        graph.add(CLASSES[name], **given[name])
+    recorder = graph.add(CLASSES["recorder"], **given["recorder"])
+    graph.until(lambda: "muscle_stack" in recorder.asked, "the question")
+    first.signal(signal.SIGKILL)
+    first.wait()
+    second = processes.node("muscle_stack", **given["muscle_stack"])
+    graph.until(lambda: recorder.finished, "the end")
+    graph.finish(recorder)
+    assert second.wait() == 0
     assert bags.differences(reference, out) == []
 
 
