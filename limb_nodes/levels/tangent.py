@@ -260,8 +260,10 @@ class Tangent:
             value = f"{x} * {y}"
             terms = [f"{dx} * {y}" if dx else "", f"{x} * {dy}" if dy else ""]
         elif isinstance(node.op, ast.Div):
-            quotient = self.keep(f"{x} / {y}", depth)
-            terms = [f"{dx} / {y}" if dx else "", f"-{quotient} * {dy} / {y}" if dy else ""]
+            # One division for value and slope: the processor takes as long for it as for a dozen of the others.
+            inverse = self.keep(f"1.0 / {y}", depth)
+            quotient = self.keep(f"{x} * {inverse}", depth)
+            terms = [f"{dx} * {inverse}" if dx else "", f"-{quotient} * {dy} * {inverse}" if dy else ""]
             value = quotient
         elif isinstance(node.op, ast.Pow):
             power = self.keep(f"{x} ** {y}", depth)

@@ -32,6 +32,9 @@ MUSCLE_INDEX = ("kind", "joint", "parameters", "state", "drive", "first", "last"
 GROUP_INDEX = ("kind", "parameters", "state", "drive", "work")
 UNIT_INDEX = ("kind", "parameters", "group", "muscle")
 
+# So many groups of a muscle get code of their own; more share a loop, which is slower and compiles faster.
+MOST_WRITTEN_OUT = 3
+
 
 @dataclass(frozen=True)
 class UnitKind:
@@ -107,9 +110,14 @@ class UnitKind:
 
 @dataclass(frozen=True)
 class MuscleKind:
-    """Muscles with the same laws. Stages as in `UnitKind`; `loop` needs the total fibre force."""
+    """Muscles with the same laws. Stages as in `UnitKind`; `loop` needs the total fibre force.
+
+    groups: the kinds of its groups of units, by index and in order; none where they are too many to be
+        written out one by one.
+    """
 
     laws: Mapping[str, Law]
+    groups: tuple[int, ...] = ()
 
     @cached_property
     def system(self) -> System:
@@ -323,7 +331,7 @@ class Packer:
     def add_muscle(self, number: int, muscle: Muscle) -> None:
         """Append a muscle with its groups and units."""
         laws = {name: muscle.laws[name].law for name in MUSCLE_PROCESSES}
-        kind_index, kind = find_or_add(self.muscle_kinds, MuscleKind(laws), lambda k: k.laws)
+        kind = next((known for known in self.muscle_kinds if known.laws == laws), MuscleKind(laws))
         values = muscle_values(muscle, kind)
         parameters = self.row(kind.columns, values)
         state = self.add_states(kind.system, values, muscle.name)
@@ -350,6 +358,9 @@ class Packer:
         for group, summed in totals.items():
             record = self.group_records[group]
             record[1] = self.row(self.unit_kinds[record[0]].columns, summed)
+        kinds = tuple(record[0] for record in self.group_records[first:])
+        whole = MuscleKind(laws, kinds if len(kinds) <= MOST_WRITTEN_OUT else ())
+        kind_index, _ = find_or_add(self.muscle_kinds, whole, lambda known: (known.laws, known.groups))
         self.muscle_records.append(
             [kind_index, muscle.joint, parameters, state, drive, first, len(self.group_records), work]
         )

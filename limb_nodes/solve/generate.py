@@ -8,7 +8,7 @@ cover, and numba's cache on disk serves every later process.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from limb_nodes.levels.equation import ScalarFunction
 from limb_nodes.levels.tangent import (
@@ -30,6 +30,8 @@ from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 
 # Never called from Python: entries for that would take a part of the time to compile.
 INLINE = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)\n'
+# With many arrays among its arguments, a call takes as long as an exponential.
+FORCED = INLINE.replace(")\n", ", forceinline=True)\n")
 
 
 class Equations:
@@ -131,9 +133,10 @@ def unit_functions(equations: Equations, number: int, kind: UnitKind) -> list[st
     states = [state.name for state, _ in kind.system.states]
     rates = [state.rate for state, _ in kind.system.states]
     texts = [unit_drive(equations, number, kind)]
+    texts += unit_force(equations, number, kind)
+    texts.append(unit_loop(equations, number, kind, ["fibre_force"], "force", True))
     for tangent in (False, True):
         texts.append(unit_before(equations, number, kind, states, tangent))
-        texts.append(unit_loop(equations, number, kind, ["fibre_force"], "force", tangent))
         if states:
             texts.append(unit_loop(equations, number, kind, rates, "rates", tangent))
     texts.append(unit_observe(equations, number, kind, states))
@@ -182,6 +185,30 @@ def unit_before(equations: Equations, number: int, kind: UnitKind, states: list[
     return body.function(f"unit{number}_before", "fibre_length, activation, p, o, x, xo, d, do, w, wo")
 
 
+def force_inputs(kind: UnitKind) -> dict[str, str]:
+    """What a unit's force needs beside the fibre velocity, and where it stands in p and w."""
+    used = used_by(upstream(kind.stages["loop"], {"fibre_force"})) | {"fibre_force"}
+    places = {name: f"p[{{o}} + {i}]" for i, name in enumerate(kind.columns)}
+    places |= {name: f"w[{{wo}} + {i}]" for i, name in enumerate(kind.kept)}
+    return {name: place for name, place in places.items() if name in used}
+
+
+def unit_force(equations: Equations, number: int, kind: UnitKind) -> list[str]:
+    """Force and its slope in the fibre velocity: from numbers, which stay in registers, and from arrays."""
+    body = Body(equations, {"fibre_velocity"})
+    body.compute(upstream(kind.stages["loop"], {"fibre_force"}))
+    body.add(f"return fibre_force, {body.slope('fibre_force')}")
+    places = force_inputs(kind)
+    given = ", ".join(["fibre_velocity", "d_fibre_velocity", *places])
+    arrays = Body(equations)
+    found = (place.format(o="o", wo="wo") for place in places.values())
+    arrays.add(f"return unit{number}_force_of({', '.join(['fibre_velocity', 'd_fibre_velocity', *found])})")
+    return [
+        body.function(f"unit{number}_force_of", given),
+        arrays.function(f"unit{number}_force", "fibre_velocity, d_fibre_velocity, p, o, w, wo"),
+    ]
+
+
 def unit_loop(
     equations: Equations,
     number: int,
@@ -190,7 +217,7 @@ def unit_loop(
     name: str,
     tangent: bool,
 ) -> str:
-    """Loop stage, for the force or the rates; without `tangent` only the velocity varies."""
+    """Loop stage, for the force or the rates, from arrays."""
     body = Body(equations)
     stage = upstream(kind.stages["loop"], set(outputs))
     used = used_by(stage) | set(outputs)
@@ -199,13 +226,12 @@ def unit_loop(
     if tangent:
         count = len(kind.kept)
         body.load_tangents([""] * count + kind.kept, used, "w[wo + ")
-    if name == "force" or tangent:
+    if tangent:
         body.active.add("fibre_velocity")
     body.compute(stage)
     if name == "force":
         body.add(f"return fibre_force, {body.slope('fibre_force')}")
-        suffix = "_t" if tangent else ""
-        return body.function(f"unit{number}_force{suffix}", "fibre_velocity, d_fibre_velocity, p, o, w, wo")
+        return body.function(f"unit{number}_force_t", "fibre_velocity, d_fibre_velocity, p, o, w, wo")
     for i, rate in enumerate(outputs):
         body.add(f"dx[xo + {i}] = {rate}")
         if tangent:
@@ -316,12 +342,12 @@ def group_loops(layout: Layout) -> list[str]:
 MUSCLE_HEAD = "o, xo, do, first, last, wo = k[i + 2], k[i + 3], k[i + 4], k[i + 5], k[i + 6], k[i + 7]"
 
 
-def muscle_functions(equations: Equations, number: int, kind: MuscleKind) -> list[str]:
-    """Functions of one kind of muscle."""
+def muscle_functions(equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind]) -> list[str]:
+    """Functions of one kind of muscle. units: all kinds of motor units."""
     return [
         muscle_drive(equations, number, kind),
-        muscle_primal(equations, number, kind, observe=False),
-        muscle_primal(equations, number, kind, observe=True),
+        muscle_primal(equations, number, kind, units, observe=False),
+        muscle_primal(equations, number, kind, units, observe=True),
         muscle_tangent(equations, number, kind),
     ]
 
@@ -349,7 +375,9 @@ def load_muscle(body: Body, kind: MuscleKind, extra: set[str]) -> list[str]:
     return states
 
 
-def muscle_primal(equations: Equations, number: int, kind: MuscleKind, observe: bool) -> str:
+def muscle_primal(
+    equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind], observe: bool
+) -> str:
     """Torque, and the rates of the states; with `observe` also all outputs."""
     body = Body(equations)
     extra = set(MUSCLE_OUTPUTS) if observe else set()
@@ -362,12 +390,12 @@ def muscle_primal(equations: Equations, number: int, kind: MuscleKind, observe: 
             body.compute(steady)
     body.compute(kind.stages["before"])
     body.add("units_before(fibre_length, activation, first, last, p, k, x, d, w)")
+    gather(body, kind, units)
     if kind.closes_loop:
-        newton(body, kind)
-        body.compute(kind.stages["loop"])
+        newton(body, kind, units)
     else:
-        body.add("total_fibre_force, slope = units_force(fibre_velocity, 0.0, first, last, p, k, w)")
-        body.compute(kind.stages["loop"])
+        body.add(*force_lines(kind, units, "0.0"), "total_fibre_force = total")
+    body.compute(kind.stages["loop"])
     body.compute(kind.stages["after"])
     body.add("w[wo] = total_fibre_force", "w[wo + 1] = slope")
     for i, (state, _) in enumerate(kind.system.states):
@@ -387,7 +415,28 @@ def muscle_primal(equations: Equations, number: int, kind: MuscleKind, observe: 
     return body.function(f"muscle{number}", "i, joint_angle, joint_velocity, p, k, x, d, w, dx")
 
 
-def newton(body: Body, kind: MuscleKind) -> None:
+def gather(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
+    """Read what the forces of the muscle's groups need from arrays, once."""
+    for group, number in enumerate(kind.groups):
+        body.add(f"r = GROUPS + (first + {group}) * GROUP_RECORD", "o_group, wo_group = k[r + 1], k[r + 4]")
+        for name, place in force_inputs(units[number]).items():
+            body.add(f"{name}_{group} = {place.format(o='o_group', wo='wo_group')}")
+
+
+def force_lines(kind: MuscleKind, units: Sequence[UnitKind], velocity_slope: str) -> list[str]:
+    """Lines that set `total` and its `slope`: the force of all groups, those few by their gathered numbers."""
+    if not kind.groups:
+        return [f"total, slope = units_force(fibre_velocity, {velocity_slope}, first, last, p, k, w)"]
+    lines = []
+    for group, number in enumerate(kind.groups):
+        given = ", ".join(f"{name}_{group}" for name in force_inputs(units[number]))
+        lines.append(f"force{group}, slope{group} = unit{number}_force_of(fibre_velocity, {velocity_slope}, {given})")
+    for name, part in ("total", "force"), ("slope", "slope"):
+        lines.append(f"{name} = " + " + ".join(f"{part}{group}" for group in range(len(kind.groups))))
+    return lines
+
+
+def newton(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
     """Find the total fibre force F that the fibres exert at the velocity that F allows.
 
     The force falls with the fibre velocity, which rises with F: total(F) never rises, so the root
@@ -395,36 +444,30 @@ def newton(body: Body, kind: MuscleKind) -> None:
     """
     inner = Body(body.equations, {"total_fibre_force"})
     inner.compute(kind.stages["loop"])
-    evaluate = [
-        *(line[4:] for line in inner.lines),
-        f"total, slope = units_force(fibre_velocity, {inner.slope('fibre_velocity')}, first, last, p, k, w)",
-    ]
     body.add(
         "total_fibre_force = w[wo]",
         "if not abs(total_fibre_force) < 1e300:",
         "    total_fibre_force = 0.0",
         "d_total_fibre_force = 1.0",
-        *evaluate,
-        "low = min(total_fibre_force, total)",
-        "high = max(total_fibre_force, total)",
-        "step = high - low",
-        "step_before = step",
+        "slope = 0.0",
+        "low, high = -math.inf, math.inf",
+        "step = step_before = math.inf",
         "squaring = False",
         "for _ in range(200):",
+        *inner.lines,
+        *(f"    {line}" for line in force_lines(kind, units, inner.slope("fibre_velocity"))),
         "    residual = total - total_fibre_force",
-        "    if residual > 0.0:",
-        "        low = total_fibre_force",
-        "    elif residual < 0.0:",
-        "        high = total_fibre_force",
-        "    else:",
+        "    if not (residual > 0.0 or residual < 0.0):",
         # Solved, or not a number, which the force then says.
         "        total_fibre_force = total",
         "        break",
+        "    low = max(low, min(total_fibre_force, total))",
+        "    high = min(high, max(total_fibre_force, total))",
         "    newton = residual / (1.0 - slope)",
         # Newton's steps may cross the root to and fro without coming nearer: those that do not
         # shrink by half over two steps give way to bisection.
-        "    quick = low <= total_fibre_force + newton <= high and 2.0 * abs(newton) <= abs(step_before)",
-        "    step_before = step",
+        "    quick = low <= total_fibre_force + newton <= high and 2.0 * abs(newton) <= step_before",
+        "    step_before = abs(step)",
         "    step = newton if quick else 0.5 * (low + high) - total_fibre_force",
         "    total_fibre_force += step",
         # Newton's method squares the relative error: behind such a step only rounding is left.
@@ -434,7 +477,6 @@ def newton(body: Body, kind: MuscleKind) -> None:
         "    if quick and squaring and abs(step) ** 3 <= 1e-14 * abs(total_fibre_force) * step_before * step_before:",
         "        break",
         "    squaring = quick",
-        *(f"    {line}" for line in evaluate),
     )
 
 
@@ -493,7 +535,7 @@ def program(layout: Layout, entries: str) -> str:
     if layout.muscles:
         texts += group_loops(layout)
     for number, muscle_kind in enumerate(layout.muscle_kinds):
-        texts += muscle_functions(equations, number, muscle_kind)
+        texts += muscle_functions(equations, number, muscle_kind, layout.unit_kinds)
     texts.append(dispatchers(layout))
     groups = layout.muscles * len(MUSCLE_INDEX)
     constants = {
@@ -554,5 +596,5 @@ def dispatchers(layout: Layout) -> str:
         ),
     ):
         lines = dispatch(target, count, "return {name}(" + given + ")", "    ")
-        parts.append("\n".join([f"{INLINE}def {name}(kind, {given}):", *lines, f"    return {back}"]) + "\n")
+        parts.append("\n".join([f"{FORCED}def {name}(kind, {given}):", *lines, f"    return {back}"]) + "\n")
     return "\n\n".join(parts)
