@@ -66,47 +66,53 @@ def corners(samples: FloatArray) -> NDArray[np.bool_]:
 
 
 @inner
-def slope_at(samples, sharp, i, j):
-    """Change per interval at sample i of input j: a central difference of fourth order.
+def slopes_of(samples, sharp):
+    """Change per interval at every sample [T * n]: a central difference of fourth order.
 
-    Of second order beside corners, one-sided at the ends.
+    Of second order beside corners and next to the ends, one-sided at the ends.
     """
-    count = samples.shape[0]
+    count, n = samples.shape
+    slopes = np.empty(samples.size)
     if count == 2:
-        return samples[1, j] - samples[0, j]
-    if i == 0:
-        return -1.5 * samples[0, j] + 2.0 * samples[1, j] - 0.5 * samples[2, j]
-    if i == count - 1:
-        return 1.5 * samples[i, j] - 2.0 * samples[i - 1, j] + 0.5 * samples[i - 2, j]
-    near = 0.5 * (samples[i + 1, j] - samples[i - 1, j])
-    if i < 2 or i > count - 3:
-        return near
-    for other in range(i - 2, i + 3):
-        if sharp[other, j]:
-            return near
-    return (8.0 * (samples[i + 1, j] - samples[i - 1, j]) - (samples[i + 2, j] - samples[i - 2, j])) / 12.0
+        for j in range(n):
+            slopes[j] = slopes[n + j] = samples[1, j] - samples[0, j]
+        return slopes
+    flat = samples.reshape(-1)
+    # What lies one and two samples before and behind each of those within; one loop over all is three times as fast.
+    before2, before, behind, behind2 = flat[: -4 * n], flat[n:], flat[3 * n :], flat[4 * n :]
+    inside = slopes[2 * n :]
+    for at in range(max(0, samples.size - 4 * n)):
+        inside[at] = (8.0 * (behind[at] - before[at]) - (behind2[at] - before2[at])) / 12.0
+    last = count - 1
+    for j in range(n):
+        slopes[j] = -1.5 * samples[0, j] + 2.0 * samples[1, j] - 0.5 * samples[2, j]
+        slopes[last * n + j] = 1.5 * samples[last, j] - 2.0 * samples[last - 1, j] + 0.5 * samples[last - 2, j]
+        slopes[n + j] = 0.5 * (samples[2, j] - samples[0, j])
+        slopes[(last - 1) * n + j] = 0.5 * (samples[last, j] - samples[last - 2, j])
+    for at in np.flatnonzero(sharp):
+        i, j = at // n, at % n
+        for near in range(max(1, i - 2), min(last, i + 3)):
+            slopes[near * n + j] = 0.5 * (samples[near + 1, j] - samples[near - 1, j])
+    return slopes
 
 
 @njit(cache=True, nogil=True)
 def cubics(samples, sharp, table):
     """Fill table [T - 1, 4 n] with pieces through samples [T, n], of which some are corners [T, n]."""
-    count, width = samples.shape
-    for j in range(width):
-        right = 0.0
-        for i in range(-1, count - 1):
-            left = right
-            right = slope_at(samples, sharp, i + 1, j)
-            if i < 0:
-                continue
-            rise = samples[i + 1, j] - samples[i, j]
-            # Beside a corner the straight line is the honest guess for the side that the corner hides,
-            # and where an input rests on a bound, a cubic must not swing past it.
-            start = rise if sharp[i, j] or rise == 0.0 else left
-            end = rise if sharp[i + 1, j] or rise == 0.0 else right
-            table[i, 4 * j] = samples[i, j]
-            table[i, 4 * j + 1] = start
-            table[i, 4 * j + 2] = 3.0 * rise - 2.0 * start - end
-            table[i, 4 * j + 3] = start + end - 2.0 * rise
+    n = samples.shape[1]
+    slopes = slopes_of(samples, sharp)
+    flat, corner, found = samples.reshape(-1), sharp.reshape(-1), table.reshape((-1, 4))
+    following, next_corner, next_slope = flat[n:], corner[n:], slopes[n:]
+    for at in range(found.shape[0]):
+        rise = following[at] - flat[at]
+        # Beside a corner the straight line is the honest guess for the side that the corner hides,
+        # and where an input rests on a bound, a cubic must not swing past it.
+        start = rise if corner[at] or rise == 0.0 else slopes[at]
+        end = rise if next_corner[at] or rise == 0.0 else next_slope[at]
+        found[at, 0] = flat[at]
+        found[at, 1] = start
+        found[at, 2] = 3.0 * rise - 2.0 * start - end
+        found[at, 3] = start + end - 2.0 * rise
 
 
 def pieces(samples: FloatArray, sharp: NDArray[np.bool_] | None = None) -> FloatArray:
