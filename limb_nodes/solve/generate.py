@@ -375,9 +375,7 @@ def load_muscle(body: Body, kind: MuscleKind, extra: set[str]) -> list[str]:
     return states
 
 
-def muscle_primal(
-    equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind], observe: bool
-) -> str:
+def muscle_primal(equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind], observe: bool) -> str:
     """Torque, and the rates of the states; with `observe` also all outputs."""
     body = Body(equations)
     extra = set(MUSCLE_OUTPUTS) if observe else set()

@@ -158,7 +158,8 @@ def interpolate(t, h, n, count, times_, y_, new_y_, stages_, out_):
         for row in range(count):
             part = min(1.0, (times[row] - t) / h)
             rest = 1.0 - part
-            out[row, i] = rest * y[i] + part * (new_y[i] + rest * (bend + part * twist))
+            # Written so that what rests stays exactly where it is.
+            out[row, i] = y[i] + part * (new_y[i] - y[i] + rest * (bend + part * twist))
 
 
 IMPLICIT = Method(step, error_norm, interpolate)

@@ -19,6 +19,10 @@ vector, integers, table = f8[::1], i8[::1], f8[:, ::1]
 DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2, 3
 # Joints within this distance (rad) of a limit are on it.
 TOUCH = 1e-12
+# A joint that meets its limit is brought so near to it (rad).
+ON_LIMIT = 1e-13
+# A joint leaves its limit where the pull has fallen to this part of that at the step's end.
+JUST = 1e-9
 # After a release the joint is left alone for this long (s), so that rounding cannot catch it again.
 LEAST_FLIGHT = 1e-9
 # Steps per second of movement, at least for one second, after which the solver gives up.
@@ -122,6 +126,111 @@ def take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, sta
         matrix,
         pivots,
     )
+
+
+@inner
+def crossing(start, gap, speed, end, end_gap, end_speed):
+    """Where the cubic through two gaps and their changes per time rises through zero; gap < 0 < end_gap."""
+    width = end - start
+    rise = end_gap - gap
+    bend, twist = speed * width - rise, rise - end_speed * width
+    low, high = 0.0, 1.0
+    part = -gap / rise
+    for _ in range(60):
+        rest = 1.0 - part
+        value = gap + part * rise + part * rest * (rest * bend + part * twist)
+        if value > 0.0:
+            high = part
+        else:
+            low = part
+        slope = rise + (rest - part) * (rest * bend + part * twist) + part * rest * (twist - bend)
+        before = part
+        part -= value / slope
+        if not low < part < high:
+            part = 0.5 * (low + high)
+        if abs(part - before) <= 1e-15:
+            break
+    return start + part * width
+
+
+@inner
+def meet_limit(
+    step,
+    rates,
+    t,
+    h,
+    y,
+    start_rates,
+    slopes,
+    stages,
+    p,
+    k,
+    u,
+    c,
+    stage_y,
+    new_y,
+    matrix,
+    pivots,
+    limits,
+    joints,
+    locked,
+):
+    """Shorten a step of size h until the first joint that crosses its limit is on it; the size, and the joint."""
+    joint, side, limit = -1, 0.0, 0.0
+    short, long = 0.0, h
+    short_gap, short_speed, long_gap, long_speed = 0.0, 0.0, 0.0, 0.0
+    for _ in range(60):
+        worst, value = overshoot(new_y, limits, joints, locked)
+        if value > TOUCH and worst != joint:
+            joint = worst
+            side = 1.0 if new_y[joint] - limits[joints + joint] > limits[joint] - new_y[joint] else -1.0
+            limit = limits[joints + joint] if side > 0.0 else limits[joint]
+            short, short_gap, short_speed = 0.0, min(-1e-300, side * (y[joint] - limit)), side * y[joints + joint]
+        gap, speed = side * (new_y[joint] - limit), side * new_y[joints + joint]
+        if gap > 0.0:
+            long, long_gap, long_speed = h, gap, speed
+        else:
+            short, short_gap, short_speed = h, gap, speed
+        if abs(gap) <= ON_LIMIT or long - short <= 1e-12 * max(1e-3, h):
+            break
+        h = crossing(short, short_gap, short_speed, long, long_gap, long_speed)
+        take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+    return h, joint
+
+
+@inner
+def leave_limit(
+    step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
+    reactions, stiff, pull, joints, locked,
+):  # fmt: skip
+    """Shorten a step of size h, at whose end a joint is pulled off its limit by `pull` (N m), until it just is.
+
+    The size, and the joint. Illinois variant of false position.
+    """
+    call(rates, t, y, p, k, u, c, stage_y)
+    call(reactions, t, y, p, k, u, c, stage_y)
+    short_value = min(-1e-300, pulled_back(stage_y, joints, locked)[1])
+    short, long, long_value = 0.0, h, pull
+    joint = -1
+    for _ in range(60):
+        part = short_value / (short_value - long_value)
+        h = short + min(0.99, max(0.01, part)) * (long - short)
+        take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+        if stiff:
+            call(rates, t + h, new_y, p, k, u, c, stage_y)
+        call(reactions, t + h, new_y, p, k, u, c, stage_y)
+        joint, value = pulled_back(stage_y, joints, locked)
+        if value > 0.0:
+            if value > 0.5 * long_value:
+                short_value *= 0.5
+            long, long_value = h, value
+        else:
+            if value < 0.5 * short_value:
+                long_value *= 0.5
+            short, short_value = h, min(-1e-300, value)
+        if abs(value) <= JUST * pull or long - short <= LEAST_FLIGHT:
+            break
+    return h, joint
 
 
 @inner
@@ -288,39 +397,22 @@ def integrate(
             if value > TOUCH:
                 event = 1
             elif t + h > quiet_until and any_locked(locked):
+                if stiff:
+                    call(rates, t + h, new_y, p, k, u, c, stage_y)
                 call(reactions, t + h, new_y, p, k, u, c, stage_y)
                 joint, value = pulled_back(stage_y, joints, locked)
                 if value > 0.0:
                     event = 2
-        if event != 0:
-            # Shorten the step until the first event lies at its end (Illinois variant of false position).
-            short, long, long_value = 0.0, h, value
-            if event == 1:
-                _, short_value = overshoot(y, limits, joints, locked)
-            else:
-                call(reactions, t, y, p, k, u, c, stage_y)
-                _, short_value = pulled_back(stage_y, joints, locked)
-            short_value = min(-1e-300, short_value)
-            for _ in range(60):
-                part = short_value / (short_value - long_value)
-                h = short + min(0.99, max(0.01, part)) * (long - short)
-                take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
-                if event == 1:
-                    joint, value = overshoot(new_y, limits, joints, locked)
-                else:
-                    call(reactions, t + h, new_y, p, k, u, c, stage_y)
-                    joint, value = pulled_back(stage_y, joints, locked)
-                if value > 0.0:
-                    if value > 0.5 * long_value:
-                        short_value *= 0.5
-                    long, long_value = h, value
-                else:
-                    if value < 0.5 * short_value:
-                        long_value *= 0.5
-                    short, short_value = h, min(-1e-300, value)
-                near = abs(value) <= 1e-13 if event == 1 else False
-                if near or long - short <= 1e-12 * max(1e-3, h):
-                    break
+        if event == 1:
+            h, joint = meet_limit(
+                step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
+                limits, joints, locked,
+            )  # fmt: skip
+        elif event == 2:
+            h, joint = leave_limit(
+                step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
+                reactions, stiff, value, joints, locked,
+            )  # fmt: skip
         first = row
         while row < times.size and times[row] <= t + h * (1.0 + 1e-12):
             row += 1

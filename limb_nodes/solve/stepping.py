@@ -247,7 +247,7 @@ class LimbStepper:
             EXPLICIT.addresses,
             program.limb_rates_c.address,
             0,
-            program.limb_reactions_c.address if limited else 0,
+            program.reactions_c.address if limited else 0,
             program.strike_c.address if limited else 0,
             0.0,
             period,

@@ -2,8 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
+from limb_nodes.solve.integrate import crossing
 from limb_nodes.solve.pieces import pieces
 from limb_nodes.solve.whole import SolveError
 
@@ -71,6 +75,29 @@ class TestLimit:
         reached = solve_ivp(rates, (0, before / RATE), model.initial_state(), "DOP853", rtol=1e-12, atol=1e-13)
         assert found.angle[before, 0] == pytest.approx(reached.y[0, -1], abs=1e-8)
 
+    @pytest.mark.parametrize("method", ["explicit", "implicit"])
+    def test_instant_of_the_release(self, method, model_named):
+        """By scipy's root of the torque at rest on the limit, and its free limb from there."""
+        time = np.arange(1201) / RATE
+        excitation = np.column_stack([np.clip(1.0 - time, 0.0, 1.0), np.zeros(time.size)])
+        held = {"segments[0].range": [-2.0, 0.6], "segments[0].angle": 0.6}
+        found = model_named("reference_joint", held).simulate(excitation, RATE, method=method, tolerance=1e-11)
+        model = model_named("reference_joint")
+        layout, program = model.layout, model.program
+        u, c = pieces(model.drives(excitation)), model.context(0.0, 1.0 / RATE)
+
+        def rates(t, y):
+            out = np.empty(2)
+            program.rates(t, np.ascontiguousarray(y), layout.parameters, layout.index, u, c, out)
+            return out
+
+        instant = brentq(lambda t: rates(t, np.array([0.6, 0.0]))[1], 0.01, 0.99, xtol=1e-13)
+        last = int(instant * RATE)
+        assert (found.angle[: last + 1, 0] == 0.6).all()
+        after = time[last + 1 :]
+        free = solve_ivp(rates, (instant, after[-1]), [0.6, 0.0], "DOP853", t_eval=after, rtol=1e-12, atol=1e-13)
+        np.testing.assert_allclose(found.angle[last + 1 :, 0], free.y[0], rtol=0, atol=1e-8)
+
     def test_a_start_on_the_limit(self, model_named):
         still = np.zeros((301, 2))
         held = {"segments[0].range": [0.3, 1.0], "segments[0].angle": 0.3}
@@ -92,6 +119,23 @@ class TestLimit:
         one, two = (model.simulate(excitation, RATE, method=method) for method in ("explicit", "implicit"))
         assert (one.angle == -0.1).any() or (one.angle == 0.25).any()
         np.testing.assert_allclose(one.angle, two.angle, rtol=0, atol=1e-6)
+
+
+@given(st.tuples(*[st.floats(-3.0, 3.0)] * 3), st.floats(0.05, 0.95), st.floats(0.1, 10.0), st.floats(0.0, 5.0))
+def test_a_cubic_is_crossed_at_its_root(shape, root, width, start):
+    """Cubics with one root between the ends: a factor that rises through it, times one that is never negative."""
+    a, b, c = shape
+
+    def gap(x):
+        return (x - root) * (0.1 + (a * x + b) ** 2 + c * c)
+
+    def slope(x):
+        return 0.1 + (a * x + b) ** 2 + c * c + (x - root) * 2.0 * a * (a * x + b)
+
+    ends = (0.0, 1.0)
+    (low, low_speed), (high, high_speed) = ((gap(x), slope(x) / width) for x in ends)
+    found = crossing.py_func(start, low, low_speed, start + width, high, high_speed)
+    assert found == pytest.approx(start + root * width, abs=1e-9 * (1.0 + start + width))
 
 
 @pytest.mark.parametrize("name", ["reference_joint", "reference_joint_tendon"])
