@@ -23,7 +23,7 @@ class Storage(Writer):
     """A bag that is open for writing.
 
     `Writer.write` builds each record from some ten small writes. `write_all` writes the same bytes in two, which takes
-    a fifth of the time; a run's recorder hands over ten thousands of messages a second.
+    a third of the time, index included; a run's recorder hands over ten thousands of messages a second.
 
     Args:
         path: the folder to make.

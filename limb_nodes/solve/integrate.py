@@ -22,7 +22,7 @@ TOUCH = 1e-12
 # A joint that meets its limit is brought so near to it (rad).
 ON_LIMIT = 1e-13
 # A joint leaves its limit where the pull has fallen to this part of that at the step's end.
-JUST = 1e-9
+JUST = 1e-11
 # After a release the joint is left alone for this long (s), so that rounding cannot catch it again.
 LEAST_FLIGHT = 1e-9
 # Steps per second of movement, at least for one second, after which the solver gives up.
@@ -228,7 +228,7 @@ def leave_limit(
             if value < 0.5 * short_value:
                 long_value *= 0.5
             short, short_value = h, min(-1e-300, value)
-        if abs(value) <= JUST * pull or long - short <= LEAST_FLIGHT:
+        if abs(value) <= JUST * pull or long - short <= 1e-12 * max(1e-3, h):
             break
     return h, joint
 

@@ -89,8 +89,8 @@ def slopes_of(samples, sharp):
         slopes[last * n + j] = 1.5 * samples[last, j] - 2.0 * samples[last - 1, j] + 0.5 * samples[last - 2, j]
         slopes[n + j] = 0.5 * (samples[2, j] - samples[0, j])
         slopes[(last - 1) * n + j] = 0.5 * (samples[last, j] - samples[last - 2, j])
-    for at in np.flatnonzero(sharp):
-        i, j = at // n, at % n
+    for corner in np.flatnonzero(sharp):
+        i, j = corner // n, corner % n
         for near in range(max(1, i - 2), min(last, i + 3)):
             slopes[near * n + j] = 0.5 * (samples[near + 1, j] - samples[near - 1, j])
     return slopes
