@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rclpy.parameter_client import AsyncParameterClient
 
 from limb_nodes.bags.activation import load_activation
 from limb_nodes.bags.read import BagReader
@@ -93,7 +94,7 @@ def test_a_node_that_is_started_anew_before_the_run(reference, limb, waves, bags
     graph, out = bench(), tmp_path / "run"
     given = {name: parameters(name, limb, waves, out) for name in NODES}
     first = processes.node("muscle_stack", **given["muscle_stack"])
-    graph.until(lambda: "muscle_stack" in graph.probe.get_node_names(), "muscle_stack")
+    graph.until(AsyncParameterClient(graph.probe, "muscle_stack").services_are_ready, "muscle_stack")
     first.signal(signal.SIGSTOP)
     for name in "activation_input", "limb_dynamics":
         graph.add(CLASSES[name], **given[name])
