@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rclpy.parameter_client import AsyncParameterClient
 
 from limb_nodes.bags.activation import load_activation
 from limb_nodes.bags.read import BagReader
@@ -90,15 +89,13 @@ def test_nodes_started_by_hand_one_after_the_other(reference, limb, waves, bags,
 
 
 def test_a_node_that_is_started_anew_before_the_run(reference, limb, waves, bags, processes, bench, tmp_path):
-    """The recorder has asked it for its parameters, and never hears from the one that it asked."""
+    """The recorder has asked it for its parameters while it was loading its limb, and gets no answer."""
     graph, out = bench(), tmp_path / "run"
     given = {name: parameters(name, limb, waves, out) for name in NODES}
-    first = processes.node("muscle_stack", **given["muscle_stack"])
-    graph.until(AsyncParameterClient(graph.probe, "muscle_stack").services_are_ready, "muscle_stack")
-    first.signal(signal.SIGSTOP)
     for name in "activation_input", "limb_dynamics":
         graph.add(CLASSES[name], **given[name])
     recorder = graph.add(CLASSES["recorder"], **given["recorder"])
+    first = processes.node("muscle_stack", **given["muscle_stack"])
     graph.until(lambda: "muscle_stack" in recorder.asked, "the question")
     first.signal(signal.SIGKILL)
     first.wait()
