@@ -11,7 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from limb_nodes.model.layout import IntArray
-from limb_nodes.solve.pointer import Callback, f8, i8, numbers, whole_numbers
+from limb_nodes.solve.inner import inner
+from limb_nodes.solve.pointer import Callback, f8, i8, invoke, numbers, whole_numbers
 
 # rates, t, h, n, rows of u, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
 STEP = (i8, f8, f8, i8, i8, *[numbers] * 5, whole_numbers, *[numbers] * 5, whole_numbers)
@@ -39,3 +40,28 @@ class Method:
     def addresses(self) -> IntArray:
         """Where the three are."""
         return np.array([self.step.address, self.error.address, self.between.address], dtype=np.int64)
+
+
+@inner
+def take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots):
+    """One step of size h by the method's function; start_rates and slopes are those at t."""
+    invoke(
+        step,
+        rates,
+        t,
+        h,
+        y.size,
+        u.shape[0],
+        y,
+        start_rates,
+        slopes,
+        stages,
+        p,
+        k,
+        u,
+        c,
+        stage_y,
+        new_y,
+        matrix,
+        pivots,
+    )

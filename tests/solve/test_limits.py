@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from limb_nodes.solve.integrate import crossing
+from limb_nodes.solve.limits import crossing
 from limb_nodes.solve.pieces import pieces
 from limb_nodes.solve.whole import SolveError
 

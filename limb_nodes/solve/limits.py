@@ -1,0 +1,200 @@
+"""Joint limits as events of a solve, compiled: a joint meets its limit, rests on it, and is pulled off it.
+
+limits: lowest angles, then highest [2 joints]. locked: per joint 1 or -1 while it rests on its highest or lowest.
+"""
+
+from __future__ import annotations
+
+import math
+
+from limb_nodes.solve.inner import inner
+from limb_nodes.solve.method import take_step
+from limb_nodes.solve.pointer import call
+
+# Joints within this distance (rad) of a limit are on it.
+TOUCH = 1e-12
+# A joint that meets its limit is brought so near to it (rad).
+ON_LIMIT = 1e-13
+# A joint leaves its limit where the pull has fallen to this part of that at the step's end.
+JUST = 1e-11
+# After a release the joint is left alone for this long (s), so that rounding cannot catch it again.
+LEAST_FLIGHT = 1e-9
+
+
+@inner
+def overshoot(new_y, limits, joints, locked):
+    """The free joint farthest beyond its limit and how far (rad, negative where none is)."""
+    joint, worst = -1, -math.inf
+    for j in range(joints):
+        if locked[j] == 0.0:
+            beyond = max(new_y[j] - limits[joints + j], limits[j] - new_y[j])
+            if beyond > worst:
+                joint, worst = j, beyond
+    return joint, worst
+
+
+@inner
+def any_locked(locked):
+    """Whether a joint rests on its limit."""
+    for flag in locked:
+        if flag != 0.0:
+            return True
+    return False
+
+
+@inner
+def turning_point(y, new_y, limits, joints, locked, h):
+    """Part of a step after which a free joint turns back so near its limit that it may have crossed it.
+
+    The largest such part, 0.0 where there is none: by its velocity a joint that turns within the
+    step has gone at most a quarter of the step beyond both its ends.
+    """
+    found = 0.0
+    for j in range(joints):
+        if locked[j] != 0.0:
+            continue
+        before, after = y[joints + j], new_y[joints + j]
+        if before > 0.0 and after < 0.0:
+            room = limits[joints + j] - max(y[j], new_y[j])
+        elif before < 0.0 and after > 0.0:
+            room = min(y[j], new_y[j]) - limits[j]
+        else:
+            continue
+        if room < 0.25 * h * max(abs(before), abs(after)):
+            found = max(found, before / (before - after))
+    return found
+
+
+@inner
+def pulled_back(reaction, joints, locked):
+    """The joint on a limit that is pulled off it most strongly, and the pull (N m, negative where none is)."""
+    joint, worst = -1, -math.inf
+    for j in range(joints):
+        if locked[j] != 0.0 and locked[j] * reaction[j] > worst:
+            joint, worst = j, locked[j] * reaction[j]
+    return joint, worst
+
+
+@inner
+def lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy):
+    """Lock the joints that start on a limit and press against it."""
+    for _ in range(joints):
+        call(rates, t, y, p, k, u, c, dy)
+        found = False
+        for j in range(joints):
+            if locked[j] != 0.0:
+                continue
+            for side, limit in ((1.0, limits[joints + j]), (-1.0, limits[j])):
+                if side * (y[j] - limit) >= -TOUCH:
+                    outward = side * y[joints + j]
+                    if outward > 0.0 or (outward == 0.0 and side * dy[joints + j] > 0.0):
+                        locked[j] = side
+                        y[j] = limit
+                        found = True
+        if not found:
+            break
+
+
+@inner
+def crossing(start, gap, speed, end, end_gap, end_speed):
+    """Where the cubic through two gaps and their changes per time rises through zero; gap < 0 < end_gap."""
+    width = end - start
+    rise = end_gap - gap
+    bend, twist = speed * width - rise, rise - end_speed * width
+    low, high = 0.0, 1.0
+    part = -gap / rise
+    for _ in range(60):
+        rest = 1.0 - part
+        value = gap + part * rise + part * rest * (rest * bend + part * twist)
+        if value > 0.0:
+            high = part
+        else:
+            low = part
+        slope = rise + (rest - part) * (rest * bend + part * twist) + part * rest * (twist - bend)
+        before = part
+        part -= value / slope
+        if not low < part < high:
+            part = 0.5 * (low + high)
+        if abs(part - before) <= 1e-15:
+            break
+    return start + part * width
+
+
+@inner
+def meet_limit(
+    step,
+    rates,
+    t,
+    h,
+    y,
+    start_rates,
+    slopes,
+    stages,
+    p,
+    k,
+    u,
+    c,
+    stage_y,
+    new_y,
+    matrix,
+    pivots,
+    limits,
+    joints,
+    locked,
+):
+    """Shorten a step of size h until the first joint that crosses its limit is on it; the size, and the joint."""
+    joint, side, limit = -1, 0.0, 0.0
+    short, long = 0.0, h
+    short_gap, short_speed, long_gap, long_speed = 0.0, 0.0, 0.0, 0.0
+    for _ in range(60):
+        worst, value = overshoot(new_y, limits, joints, locked)
+        if value > TOUCH and worst != joint:
+            joint = worst
+            side = 1.0 if new_y[joint] - limits[joints + joint] > limits[joint] - new_y[joint] else -1.0
+            limit = limits[joints + joint] if side > 0.0 else limits[joint]
+            short, short_gap, short_speed = 0.0, min(-1e-300, side * (y[joint] - limit)), side * y[joints + joint]
+        gap, speed = side * (new_y[joint] - limit), side * new_y[joints + joint]
+        if gap > 0.0:
+            long, long_gap, long_speed = h, gap, speed
+        else:
+            short, short_gap, short_speed = h, gap, speed
+        if abs(gap) <= ON_LIMIT or long - short <= 1e-12 * max(1e-3, h):
+            break
+        h = crossing(short, short_gap, short_speed, long, long_gap, long_speed)
+        take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+    return h, joint
+
+
+@inner
+def leave_limit(
+    step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
+    reactions, stiff, pull, joints, locked,
+):  # fmt: skip
+    """Shorten a step of size h, at whose end a joint is pulled off its limit by `pull` (N m), until it just is.
+
+    The size, and the joint. Illinois variant of false position.
+    """
+    call(rates, t, y, p, k, u, c, stage_y)
+    call(reactions, t, y, p, k, u, c, stage_y)
+    short_value = min(-1e-300, pulled_back(stage_y, joints, locked)[1])
+    short, long, long_value = 0.0, h, pull
+    joint = -1
+    for _ in range(60):
+        part = short_value / (short_value - long_value)
+        h = short + min(0.99, max(0.01, part)) * (long - short)
+        take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+        if stiff:
+            call(rates, t + h, new_y, p, k, u, c, stage_y)
+        call(reactions, t + h, new_y, p, k, u, c, stage_y)
+        joint, value = pulled_back(stage_y, joints, locked)
+        if value > 0.0:
+            if value > 0.5 * long_value:
+                short_value *= 0.5
+            long, long_value = h, value
+        else:
+            if value < 0.5 * short_value:
+                long_value *= 0.5
+            short, short_value = h, min(-1e-300, value)
+        if abs(value) <= JUST * pull or long - short <= 1e-12 * max(1e-3, h):
+            break
+    return h, joint
