@@ -75,8 +75,9 @@ class Process:
 
     @property
     def said(self) -> str:
-        """What is on its standard error so far."""
-        return self.err.read_text()
+        """What is on its standard error so far, but for remarks of Fast DDS, which tries another port then."""
+        lines = self.err.read_text().splitlines(keepends=True)
+        return "".join(line for line in lines if "RTPS_TRANSPORT_SHM" not in line)
 
     @property
     def printed(self) -> str:

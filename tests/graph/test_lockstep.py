@@ -66,7 +66,11 @@ def test_four_processes_give_the_same_values(reference, limb, waves, bags, tmp_p
     ],
     ids=["as modules", "as installed scripts"],
 )
-def test_nodes_started_by_hand_all_at_once(order, script, reference, limb, waves, bags, processes, tmp_path):
+def test_nodes_started_by_hand_all_at_once(
+    order, script, reference, limb, waves, bags, processes, monkeypatch, tmp_path
+):
+    """By the transport that a user has."""
+    monkeypatch.delenv("FASTDDS_BUILTIN_TRANSPORTS")
     if script and not Path(sys.prefix, "lib/limb_nodes/recorder").exists():
         pytest.skip("limb-nodes is not installed in this environment")
     out = tmp_path / "run"
