@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from limb_nodes.model import layout
 from limb_nodes.solve import chain
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import pieces, straight
@@ -205,10 +206,7 @@ cfunc, carray = njit, None
 def interpreted(model) -> dict:
     """The program of a model without compilation: its text, run by Python."""
     text = Path(model.program.__file__).read_text()
-    plain = (
-        "def njit(*a, **k):\n    return a[0] if a and callable(a[0]) else lambda f: f\ncfunc = njit\ncarray = None\n"
-    )
-    text, count = re.subn(r"^from numba import .*$", plain.replace("\\", r"\\"), text, count=1, flags=re.MULTILINE)
+    text, count = re.subn(r"^from numba import .*$", NO_NUMBA, text, count=1, flags=re.MULTILINE)
     assert count == 1
     space: dict = {}
     exec(compile(text, model.program.__file__, "exec"), space)
@@ -238,6 +236,25 @@ def test_compiled_equals_interpreted(name, model_named, waves):
         slopes = np.empty((4, layout.joints))
         space["torque_slopes"](y, layout.parameters, layout.index, u, model.context(0.0, PERIOD), slopes)
         np.testing.assert_allclose(slopes, total_torque(model, y, u), rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["reference_joint", "reference_joint_tendon", "pennate_leg"])
+def test_many_groups_in_a_loop_and_few_written_out_are_alike(name, model_named, waves, monkeypatch):
+    written = model_named(name)
+    monkeypatch.setattr(layout, "MOST_WRITTEN_OUT", 0)
+    looped = model_named(name)
+    assert all(kind.groups for kind in written.layout.muscle_kinds)
+    assert not any(kind.groups for kind in looped.layout.muscle_kinds)
+    inputs = pieces(written.drives(waves(np.arange(11) / 10.0, written.layout.muscles)))
+    both = []
+    for model in (written, looped):
+        y, c, program = model.initial_state(), model.context(0.0, 0.1), interpreted(model)
+        out = np.empty((10, y.size))
+        for row in range(10):
+            program["rates"](0.1 * row, y, model.layout.parameters, model.layout.index, inputs, c, out[row])
+            y = y + 1e-3 * out[row]
+        both.append(out)
+    np.testing.assert_allclose(both[0], both[1], rtol=1e-12, atol=1e-12 * np.abs(both[0]).max())
 
 
 def test_limbs_of_one_structure_share_a_program(model_named):
