@@ -186,7 +186,7 @@ def test_play_does_not_take_a_recorder_for_a_listener(processes, bench, until, b
     player = processes.limb("play", ramp, "--wait", "600")
     graph = bench()
     graph.until(lambda: graph.probe.count_publishers("emg_envelope"), "the player")
-    for _ in range(20):
+    for _ in range(10):
         context = Context()
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
         recorder = rclpy.create_node("recorder", context=context, start_parameter_services=False)
