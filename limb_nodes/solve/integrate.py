@@ -12,17 +12,7 @@ import numpy as np
 from numba import njit, types
 
 from limb_nodes.solve.inner import inner
-from limb_nodes.solve.limits import (
-    LEAST_FLIGHT,
-    TOUCH,
-    any_locked,
-    leave_limit,
-    lock_touching,
-    meet_limit,
-    overshoot,
-    pulled_back,
-    turning_point,
-)
+from limb_nodes.solve.limits import LEAST_FLIGHT, NOTHING, RELEASE
 from limb_nodes.solve.method import take_step
 from limb_nodes.solve.pointer import call, f8, i8, invoke
 
@@ -58,6 +48,7 @@ def difference_slopes(rates, y, p, k, u, c, scale, out):
 
 SIGNATURE = types.int64(
     integers,
+    integers,
     i8,
     i8,
     i8,
@@ -85,6 +76,7 @@ SIGNATURE = types.int64(
 @njit(SIGNATURE, cache=True, error_model="numpy", nogil=True)
 def integrate(
     method,
+    limiting,
     rates,
     jacobian,
     reactions,
@@ -109,8 +101,9 @@ def integrate(
 ):
     """Advance y in place from start to end and fill out [times, states]; a status.
 
-    method: EXPLICIT or IMPLICIT. rates, jacobian, reactions, strike: addresses of the program's
-    functions; jacobian is used by the implicit method, the last two where there are joints.
+    method: addresses of EXPLICIT or IMPLICIT. limiting: those of `limits`. rates, jacobian, reactions, strike:
+        addresses of the program's functions; jacobian is used by the implicit method, the last two where there
+        are joints.
     joints: the first `joints` states are angles, the next as many their velocities; 0 where there
         are no limits. Limits stand in p at limit_offset, the flags of joints on a limit in c at
         locked_offset.
@@ -120,15 +113,15 @@ def integrate(
     """
     n = y.size
     step, error_of, between = method[0], method[1], method[2]
-    found = np.empty(1)
+    settle, find_event, take_effect = limiting[0], limiting[1], limiting[2]
+    rows = u.shape[0]
+    found = np.empty(3)
     stages = np.empty((7, n))
     stage_y, new_y, start_rates = np.empty(n), np.empty(n), np.empty(n)
     stiff = jacobian != 0
     slopes = np.empty(n * (n + 1) if stiff else 0)
     matrix = np.empty((n, n) if stiff else (0, 0))
     pivots = np.empty(n if stiff else 0, dtype=np.int64)
-    limits = p[limit_offset : limit_offset + 2 * joints]
-    locked = c[locked_offset : locked_offset + joints]
     span = end - start
     t = start
     row, stop = 0, 0
@@ -136,11 +129,9 @@ def integrate(
         copy(y, out[row])
         row += 1
     if joints > 0:
-        lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, start_rates)
-        for j in range(joints):
-            if locked[j] != 0.0 and y[joints + j] != 0.0:
-                call(strike, t, y, p, k, u, c, stage_y)
-                break
+        invoke(
+            settle, rates, strike, t, n, rows, joints, limit_offset, locked_offset, y, p, k, u, c, start_rates
+        )  # fmt: skip
     call(rates, t, y, p, k, u, c, start_rates)
     fresh = False
     h = progress[3] if progress[3] > 0.0 else min(longest, span) * 0.01
@@ -178,59 +169,31 @@ def integrate(
                 h *= max(0.2, 0.9 * error**power)
             progress[1] += 1
             continue
-        event, joint, value = 0, -1, 0.0
+        event, joint = NOTHING, -1
         if joints > 0:
-            part = turning_point(y, new_y, limits, joints, locked, h)
-            if part > 0.0:
-                # The ends of a step do not tell of a touch in between: look where the joint turns.
-                take_step(
-                    step, rates, t, part * h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
-                )
-                if overshoot(new_y, limits, joints, locked)[1] > TOUCH:
-                    h = part * h
-                    clipped = False
-                else:
-                    take_step(
-                        step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
-                    )
-            joint, value = overshoot(new_y, limits, joints, locked)
-            if value > TOUCH:
-                event = 1
-            elif t + h > quiet_until and any_locked(locked):
-                if stiff:
-                    call(rates, t + h, new_y, p, k, u, c, stage_y)
-                call(reactions, t + h, new_y, p, k, u, c, stage_y)
-                joint, value = pulled_back(stage_y, joints, locked)
-                if value > 0.0:
-                    event = 2
-        if event == 1:
-            h, joint = meet_limit(
-                step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
-                limits, joints, locked,
+            invoke(
+                find_event, step, rates, reactions, t, h, quiet_until, n, rows, joints, limit_offset, locked_offset,
+                jacobian, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots, found,
             )  # fmt: skip
-        elif event == 2:
-            h, joint = leave_limit(
-                step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
-                reactions, stiff, value, joints, locked,
-            )  # fmt: skip
+            event, joint = int(found[0]), int(found[1])
+            clipped = clipped and found[2] == h
+            h = found[2]
         first = row
         while row < times.size and times[row] <= t + h * (1.0 + 1e-12):
             row += 1
         if row > first:
             invoke(between, t, h, n, row - first, times[first:], y, new_y, stages, out[first:])
-        t = barrier if clipped and event == 0 else t + h
+        t = barrier if clipped and event == NOTHING else t + h
         copy(new_y, y)
         progress[0] += 1
         fresh = False
-        if event == 1:
-            side = 1.0 if y[joint] - limits[joints + joint] > limits[joint] - y[joint] else -1.0
-            y[joint] = limits[joints + joint] if side > 0.0 else limits[joint]
-            locked[joint] = side
-            call(strike, t, y, p, k, u, c, stage_y)
-            h = max(h, 0.1 * wanted)
-        elif event == 2:
-            locked[joint] = 0.0
-            quiet_until = t + LEAST_FLIGHT
+        if event != NOTHING:
+            invoke(
+                take_effect, strike, t, n, rows, joints, limit_offset, locked_offset, event, joint,
+                y, p, k, u, c, stage_y,
+            )  # fmt: skip
+            if event == RELEASE:
+                quiet_until = t + LEAST_FLIGHT
             h = max(h, 0.1 * wanted)
         else:
             if stiff:
@@ -242,7 +205,7 @@ def integrate(
             if clipped:
                 h = max(h, wanted)
         h = min(h, longest)
-        if event != 0 or stiff:
+        if event != NOTHING or stiff:
             call(rates, t, y, p, k, u, c, start_rates)
         else:
             copy(stages[6], start_rates)

@@ -1,15 +1,26 @@
 """Joint limits as events of a solve, compiled: a joint meets its limit, rests on it, and is pulled off it.
 
-limits: lowest angles, then highest [2 joints]. locked: per joint 1 or -1 while it rests on its highest or lowest.
+Called by address, as a method is, so that limbs without limits need not wait for their compilation.
+
+limits: lowest angles, then highest [2 joints]; they stand in the parameters p at limit_offset. locked: per joint
+1 or -1 while it rests on its highest or lowest; in the context c at locked_offset.
 """
 
 from __future__ import annotations
 
 import math
+from functools import cache
 
+import numpy as np
+from numba import carray
+
+from limb_nodes.model.layout import IntArray
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.method import take_step
-from limb_nodes.solve.pointer import call
+from limb_nodes.solve.pointer import call, callback, f8, i8, numbers, whole_numbers
+
+# What happens at the end of a step.
+NOTHING, IMPACT, RELEASE = 0, 1, 2
 
 # Joints within this distance (rad) of a limit are on it.
 TOUCH = 1e-12
@@ -183,7 +194,7 @@ def leave_limit(
         part = short_value / (short_value - long_value)
         h = short + min(0.99, max(0.01, part)) * (long - short)
         take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
-        if stiff:
+        if stiff != 0:
             call(rates, t + h, new_y, p, k, u, c, stage_y)
         call(reactions, t + h, new_y, p, k, u, c, stage_y)
         joint, value = pulled_back(stage_y, joints, locked)
@@ -198,3 +209,95 @@ def leave_limit(
         if abs(value) <= JUST * pull or long - short <= 1e-12 * max(1e-3, h):
             break
     return h, joint
+
+
+@inner
+def parts(joints, limit_offset, locked_offset, p_, c_):
+    """limits and locked as arrays."""
+    return (
+        carray(p_, (limit_offset + 2 * joints,))[limit_offset:],
+        carray(c_, (locked_offset + joints,))[locked_offset:],
+    )
+
+
+# rates, strike, t, n, rows of u, joints, limit_offset, locked_offset, y, p, k, u, c, dy
+@callback(i8, i8, f8, *[i8] * 5, *[numbers] * 2, whole_numbers, *[numbers] * 3)
+def settle(rates, strike, t, n, rows, joints, limit_offset, locked_offset, y_, p_, k_, u_, c_, dy_):
+    """Lock the joints that start on a limit and press against it, and stop those that move there."""
+    y, dy = carray(y_, (n,)), carray(dy_, (n,))
+    p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
+    limits, locked = parts(joints, limit_offset, locked_offset, p_, c_)
+    lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy)
+    for j in range(joints):
+        if locked[j] != 0.0 and y[joints + j] != 0.0:
+            call(strike, t, y, p, k, u, c, dy)
+            break
+
+
+# step, rates, reactions, t, h, quiet_until, n, rows of u, joints, limit_offset, locked_offset, stiff,
+# y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots, found
+@callback(*[i8] * 3, *[f8] * 3, *[i8] * 6, *[numbers] * 5, whole_numbers, *[numbers] * 5, whole_numbers, numbers)
+def find_event(
+    step, rates, reactions, t, h, quiet_until, n, rows, joints, limit_offset, locked_offset, stiff,
+    y_, start_rates, slopes, stages, p_, k_, u_, c_, stage_y_, new_y_, matrix, pivots, found,
+):  # fmt: skip
+    """End a step of size h with the first event in it. found: the event, the joint, the size of the step.
+
+    Until the time quiet_until no joint is released.
+    """
+    y, stage_y, new_y = carray(y_, (n,)), carray(stage_y_, (n,)), carray(new_y_, (n,))
+    p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
+    limits, locked = parts(joints, limit_offset, locked_offset, p_, c_)
+    part = turning_point(y, new_y, limits, joints, locked, h)
+    if part > 0.0:
+        # The ends of a step do not tell of a touch in between: look where the joint turns.
+        take_step(step, rates, t, part * h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+        if overshoot(new_y, limits, joints, locked)[1] > TOUCH:
+            h = part * h
+        else:
+            take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+    event = NOTHING
+    joint, value = overshoot(new_y, limits, joints, locked)
+    if value > TOUCH:
+        event = IMPACT
+        h, joint = meet_limit(
+            step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
+            limits, joints, locked,
+        )  # fmt: skip
+    elif t + h > quiet_until and any_locked(locked):
+        if stiff != 0:
+            call(rates, t + h, new_y, p, k, u, c, stage_y)
+        call(reactions, t + h, new_y, p, k, u, c, stage_y)
+        joint, value = pulled_back(stage_y, joints, locked)
+        if value > 0.0:
+            event = RELEASE
+            h, joint = leave_limit(
+                step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
+                reactions, stiff, value, joints, locked,
+            )  # fmt: skip
+    found[0], found[1], found[2] = event, joint, h
+
+
+# strike, t, n, rows of u, joints, limit_offset, locked_offset, event, joint, y, p, k, u, c, scratch
+@callback(i8, f8, *[i8] * 7, *[numbers] * 2, whole_numbers, *[numbers] * 3)
+def take_effect(strike, t, n, rows, joints, limit_offset, locked_offset, event, joint, y_, p_, k_, u_, c_, scratch_):
+    """What an event does to the state y: an impact stops its joint and jolts the others."""
+    y, scratch = carray(y_, (n,)), carray(scratch_, (n,))
+    p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
+    limits, locked = parts(joints, limit_offset, locked_offset, p_, c_)
+    if event == RELEASE:
+        locked[joint] = 0.0
+        return
+    side = 1.0 if y[joint] - limits[joints + joint] > limits[joint] - y[joint] else -1.0
+    y[joint] = limits[joints + joint] if side > 0.0 else limits[joint]
+    locked[joint] = side
+    call(strike, t, y, p, k, u, c, scratch)
+
+
+@cache
+def addresses() -> IntArray:
+    """Where `settle`, `find_event` and `take_effect` are."""
+    return np.array([settle.address, find_event.address, take_effect.address], dtype=np.int64)
+
+
+NO_LIMITS: IntArray = np.zeros(3, dtype=np.int64)

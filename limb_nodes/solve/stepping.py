@@ -13,6 +13,7 @@ import numpy as np
 
 from limb_nodes.model.layout import FloatArray
 from limb_nodes.model.limb import Limb
+from limb_nodes.solve import limits
 from limb_nodes.solve.explicit import EXPLICIT
 from limb_nodes.solve.integrate import DONE, integrate
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
@@ -125,6 +126,7 @@ class MuscleStepper:
         self._progress[3] = period
         status = integrate(
             EXPLICIT.addresses,
+            limits.NO_LIMITS,
             program.muscle_rates_c.address,
             0,
             0,
@@ -245,6 +247,7 @@ class LimbStepper:
         self._progress[3] = period
         status = integrate(
             EXPLICIT.addresses,
+            limits.addresses() if limited else limits.NO_LIMITS,
             program.limb_rates_c.address,
             0,
             program.reactions_c.address if limited else 0,

@@ -11,6 +11,7 @@ import numpy as np
 from limb_nodes.errors import UserError
 from limb_nodes.model.layout import FloatArray, Layout, build_layout
 from limb_nodes.model.limb import Limb
+from limb_nodes.solve import limits
 from limb_nodes.solve.compile import compiled
 from limb_nodes.solve.drive_table import DriveTable
 from limb_nodes.solve.explicit import EXPLICIT
@@ -239,6 +240,7 @@ class WholeModel:
         layout, program, limited = self.layout, self.program, self.limited
         status = integrate(
             chosen.addresses,
+            limits.addresses() if limited else limits.NO_LIMITS,
             program.rates_c.address,
             program.jacobian_c.address if chosen is IMPLICIT else 0,
             program.reactions_c.address if limited else 0,
