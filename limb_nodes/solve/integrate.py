@@ -122,6 +122,7 @@ def integrate(
     slopes = np.empty(n * (n + 1) if stiff else 0)
     matrix = np.empty((n, n) if stiff else (0, 0))
     pivots = np.empty(n if stiff else 0, dtype=np.int64)
+    arrays = y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
     span = end - start
     t = start
     row, stop = 0, 0
@@ -156,7 +157,7 @@ def integrate(
         if stiff and not fresh:
             call(jacobian, t, y, p, k, u, c, slopes)
             fresh = True
-        take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+        take_step(step, rates, t, h, arrays)
         invoke(error_of, h, tolerance, n, y, new_y, stages, scale, found)
         error = found[0]
         if not error <= 1.0:
@@ -173,7 +174,7 @@ def integrate(
         if joints > 0:
             invoke(
                 find_event, step, rates, reactions, t, h, quiet_until, n, rows, joints, limit_offset, locked_offset,
-                jacobian, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots, found,
+                jacobian, found, *arrays,
             )  # fmt: skip
             event, joint = int(found[0]), int(found[1])
             clipped = clipped and found[2] == h

@@ -16,7 +16,7 @@ from numba import carray
 
 from limb_nodes.model.layout import IntArray
 from limb_nodes.solve.inner import inner
-from limb_nodes.solve.method import take_step
+from limb_nodes.solve.method import STEP, take_step
 from limb_nodes.solve.pointer import call, callback, f8, i8, numbers, whole_numbers
 
 # What happens at the end of a step.
@@ -87,6 +87,25 @@ def pulled_back(reaction, joints, locked):
 
 
 @inner
+def pull_behind(rates, reactions, stiff, t, arrays, joints, locked):
+    """`pulled_back` at the end t of a step."""
+    _, _, _, _, p, k, u, c, stage_y, new_y, _, _ = arrays
+    if stiff != 0:
+        # The explicit step ends with the rates there, which leave the torques that `reactions` takes.
+        call(rates, t, new_y, p, k, u, c, stage_y)
+    call(reactions, t, new_y, p, k, u, c, stage_y)
+    return pulled_back(stage_y, joints, locked)
+
+
+@inner
+def crossed(y, limits, joints, joint):
+    """The limit that a joint is farther beyond: 1 for the highest or -1 for the lowest, and its angle."""
+    if y[joint] - limits[joints + joint] > limits[joint] - y[joint]:
+        return 1.0, limits[joints + joint]
+    return -1.0, limits[joint]
+
+
+@inner
 def lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy):
     """Lock the joints that start on a limit and press against it."""
     for _ in range(joints):
@@ -132,28 +151,9 @@ def crossing(start, gap, speed, end, end_gap, end_speed):
 
 
 @inner
-def meet_limit(
-    step,
-    rates,
-    t,
-    h,
-    y,
-    start_rates,
-    slopes,
-    stages,
-    p,
-    k,
-    u,
-    c,
-    stage_y,
-    new_y,
-    matrix,
-    pivots,
-    limits,
-    joints,
-    locked,
-):
+def meet_limit(step, rates, t, h, arrays, limits, joints, locked):
     """Shorten a step of size h until the first joint that crosses its limit is on it; the size, and the joint."""
+    y, new_y = arrays[0], arrays[9]
     joint, side, limit = -1, 0.0, 0.0
     short, long = 0.0, h
     short_gap, short_speed, long_gap, long_speed = 0.0, 0.0, 0.0, 0.0
@@ -161,8 +161,7 @@ def meet_limit(
         worst, value = overshoot(new_y, limits, joints, locked)
         if value > TOUCH and worst != joint:
             joint = worst
-            side = 1.0 if new_y[joint] - limits[joints + joint] > limits[joint] - new_y[joint] else -1.0
-            limit = limits[joints + joint] if side > 0.0 else limits[joint]
+            side, limit = crossed(new_y, limits, joints, joint)
             short, short_gap, short_speed = 0.0, min(-1e-300, side * (y[joint] - limit)), side * y[joints + joint]
         gap, speed = side * (new_y[joint] - limit), side * new_y[joints + joint]
         if gap > 0.0:
@@ -172,19 +171,17 @@ def meet_limit(
         if abs(gap) <= ON_LIMIT or long - short <= 1e-12 * max(1e-3, h):
             break
         h = crossing(short, short_gap, short_speed, long, long_gap, long_speed)
-        take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+        take_step(step, rates, t, h, arrays)
     return h, joint
 
 
 @inner
-def leave_limit(
-    step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
-    reactions, stiff, pull, joints, locked,
-):  # fmt: skip
+def leave_limit(step, rates, reactions, stiff, t, h, arrays, pull, joints, locked):
     """Shorten a step of size h, at whose end a joint is pulled off its limit by `pull` (N m), until it just is.
 
     The size, and the joint. Illinois variant of false position.
     """
+    y, _, _, _, p, k, u, c, stage_y, _, _, _ = arrays
     call(rates, t, y, p, k, u, c, stage_y)
     call(reactions, t, y, p, k, u, c, stage_y)
     short_value = min(-1e-300, pulled_back(stage_y, joints, locked)[1])
@@ -193,11 +190,8 @@ def leave_limit(
     for _ in range(60):
         part = short_value / (short_value - long_value)
         h = short + min(0.99, max(0.01, part)) * (long - short)
-        take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
-        if stiff != 0:
-            call(rates, t + h, new_y, p, k, u, c, stage_y)
-        call(reactions, t + h, new_y, p, k, u, c, stage_y)
-        joint, value = pulled_back(stage_y, joints, locked)
+        take_step(step, rates, t, h, arrays)
+        joint, value = pull_behind(rates, reactions, stiff, t + h, arrays, joints, locked)
         if value > 0.0:
             if value > 0.5 * long_value:
                 short_value *= 0.5
@@ -234,12 +228,12 @@ def settle(rates, strike, t, n, rows, joints, limit_offset, locked_offset, y_, p
             break
 
 
-# step, rates, reactions, t, h, quiet_until, n, rows of u, joints, limit_offset, locked_offset, stiff,
-# y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots, found
-@callback(*[i8] * 3, *[f8] * 3, *[i8] * 6, *[numbers] * 5, whole_numbers, *[numbers] * 5, whole_numbers, numbers)
+# step, rates, reactions, t, h, quiet_until, n, rows of u, joints, limit_offset, locked_offset, stiff, found,
+# and the arrays of `STEP`
+@callback(*[i8] * 3, *[f8] * 3, *[i8] * 6, numbers, *STEP[5:])
 def find_event(
-    step, rates, reactions, t, h, quiet_until, n, rows, joints, limit_offset, locked_offset, stiff,
-    y_, start_rates, slopes, stages, p_, k_, u_, c_, stage_y_, new_y_, matrix, pivots, found,
+    step, rates, reactions, t, h, quiet_until, n, rows, joints, limit_offset, locked_offset, stiff, found,
+    y_, start_rates, slopes, stages, p_, k_, u_, c_, stage_y_, new_y_, matrix, pivots,
 ):  # fmt: skip
     """End a step of size h with the first event in it. found: the event, the joint, the size of the step.
 
@@ -248,33 +242,25 @@ def find_event(
     y, stage_y, new_y = carray(y_, (n,)), carray(stage_y_, (n,)), carray(new_y_, (n,))
     p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
     limits, locked = parts(joints, limit_offset, locked_offset, p_, c_)
+    arrays = y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
     part = turning_point(y, new_y, limits, joints, locked, h)
     if part > 0.0:
         # The ends of a step do not tell of a touch in between: look where the joint turns.
-        take_step(step, rates, t, part * h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+        take_step(step, rates, t, part * h, arrays)
         if overshoot(new_y, limits, joints, locked)[1] > TOUCH:
             h = part * h
         else:
-            take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots)
+            take_step(step, rates, t, h, arrays)
     event = NOTHING
     joint, value = overshoot(new_y, limits, joints, locked)
     if value > TOUCH:
         event = IMPACT
-        h, joint = meet_limit(
-            step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
-            limits, joints, locked,
-        )  # fmt: skip
+        h, joint = meet_limit(step, rates, t, h, arrays, limits, joints, locked)
     elif t + h > quiet_until and any_locked(locked):
-        if stiff != 0:
-            call(rates, t + h, new_y, p, k, u, c, stage_y)
-        call(reactions, t + h, new_y, p, k, u, c, stage_y)
-        joint, value = pulled_back(stage_y, joints, locked)
+        joint, value = pull_behind(rates, reactions, stiff, t + h, arrays, joints, locked)
         if value > 0.0:
             event = RELEASE
-            h, joint = leave_limit(
-                step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots,
-                reactions, stiff, value, joints, locked,
-            )  # fmt: skip
+            h, joint = leave_limit(step, rates, reactions, stiff, t, h, arrays, value, joints, locked)
     found[0], found[1], found[2] = event, joint, h
 
 
@@ -288,9 +274,7 @@ def take_effect(strike, t, n, rows, joints, limit_offset, locked_offset, event, 
     if event == RELEASE:
         locked[joint] = 0.0
         return
-    side = 1.0 if y[joint] - limits[joints + joint] > limits[joint] - y[joint] else -1.0
-    y[joint] = limits[joints + joint] if side > 0.0 else limits[joint]
-    locked[joint] = side
+    locked[joint], y[joint] = crossed(y, limits, joints, joint)
     call(strike, t, y, p, k, u, c, scratch)
 
 

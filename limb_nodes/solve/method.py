@@ -43,25 +43,7 @@ class Method:
 
 
 @inner
-def take_step(step, rates, t, h, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots):
-    """One step of size h by the method's function; start_rates and slopes are those at t."""
-    invoke(
-        step,
-        rates,
-        t,
-        h,
-        y.size,
-        u.shape[0],
-        y,
-        start_rates,
-        slopes,
-        stages,
-        p,
-        k,
-        u,
-        c,
-        stage_y,
-        new_y,
-        matrix,
-        pivots,
-    )
+def take_step(step, rates, t, h, arrays):
+    """One step of size h by the method's function. arrays: those of `STEP`, from y to pivots."""
+    y, u = arrays[0], arrays[6]
+    invoke(step, rates, t, h, y.size, u.shape[0], *arrays)
