@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import signal
 import time
 from pathlib import Path
@@ -150,15 +149,12 @@ def test_a_played_recording_moves_the_limb_as_in_lockstep(limb, lockstep, proces
     assert live.wait() == 130
     assert "Traceback" not in live.said
     found, still = bags.decoded(out, TOPICS), bags.decoded(lockstep(envelopes, 8.0, str(resting), rate), TOPICS)
-    # How long (s) a machine that is busy kept the player or the limb waiting: activations change by 0.8 per s at most,
-    # the angle by 3 rad per s.
-    kept = float(re.search(r"the latest message ([\d.]+) ms late", player.printed)[1]) / 1e3 + missed(out) / rate
     late, error = delay(found["activation"]["activation"], still["activation"]["activation"])
-    assert error < 0.1 + 0.8 * kept, "the activation is the recording"
+    assert error < 0.1, "the activation is the recording"
     moved, difference = delay(found["joint_states"]["position"], still["joint_states"]["position"])
-    assert abs(moved - late) <= 4 + kept * rate, "the movement follows the activation"
+    assert abs(moved - late) <= 4, "the movement follows the activation"
     assert np.ptp(still["joint_states"]["position"]) > 0.1
-    assert difference < 0.05 * np.ptp(still["joint_states"]["position"]) + 3.0 * kept
+    assert difference < 0.05 * np.ptp(still["joint_states"]["position"])
     with BagReader(out) as bag:
         assert bag.count("emg_envelope") == 401
 
