@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from limb_nodes.model.layout import FloatArray
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.solve.bench import BenchRecord
 
 # Unit of every output in the CSV file.

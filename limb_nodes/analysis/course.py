@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from limb_nodes.bags.read import BagReader
-from limb_nodes.model.layout import FloatArray
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, UNIT_FIELDS
 from limb_nodes.solve.whole import Movement

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.levels.motor_unit.fibre import fibre_length_norm, frequency_norm
 from limb_nodes.levels.sarcomere.lengths import (
     maximum_sarcomere_length,
@@ -20,7 +21,6 @@ from limb_nodes.levels.sarcomere.lengths import (
     optimal_sarcomere_length,
 )
 from limb_nodes.model.chosen import ChosenLaw
-from limb_nodes.model.layout import FloatArray
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
 from limb_nodes.model.probe import Probe, given, initial_states
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from limb_nodes.analysis.course import Course
 from limb_nodes.analysis.verification import Case
-from limb_nodes.model.layout import FloatArray
+from limb_nodes.foundation.arrays import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from limb_nodes.bags.named_values import is_bag, read_named_values
-from limb_nodes.bags.table import TIME_UNITS, FloatArray, read_table
+from limb_nodes.bags.table import TIME_UNITS, read_table
 from limb_nodes.bags.waveform import Waveform, parse_constants, read_waveforms, sample_waveforms
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.arrays import FloatArray
 
 # A recorded run holds what drove its muscles on the first topic, a recording of EMG on the second.
 ACTIVATION_TOPICS = ("activation", "emg_envelope")

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from limb_nodes.bags.columns import Layout
 from limb_nodes.bags.types import TOPIC_TYPES, limb_typestore, make_message
 from limb_nodes.bags.write import BagWriter
+from limb_nodes.foundation.arrays import IntArray
 
 SECOND = 1_000_000_000
 
@@ -18,7 +19,7 @@ SECOND = 1_000_000_000
 def write_table(
     writer: BagWriter,
     topic: str,
-    stamps: npt.NDArray[np.int64],
+    stamps: IntArray,
     texts: Mapping[str, Any],
     numbers: Mapping[str, npt.NDArray[Any]],
 ) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-from limb_nodes.bags.table import FloatArray
+from limb_nodes.foundation.arrays import FloatArray
 
 DEFAULT_BAND = (20.0, 450.0)
 DEFAULT_LOW_PASS = 6.0

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from limb_nodes.bags.table import TIME_UNITS, FloatArray, read_table
+from limb_nodes.bags.table import TIME_UNITS, read_table
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.arrays import FloatArray
 
 LENGTH_UNITS = {"": 1.0, "m": 1.0, "mm": 1e-3}
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from limb_nodes.bags.table import FloatArray
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.arrays import FloatArray
 
 
 @dataclass(frozen=True)

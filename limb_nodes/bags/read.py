@@ -8,7 +8,6 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import get_types_from_msg
@@ -19,6 +18,7 @@ from ruamel.yaml.error import YAMLError
 from limb_nodes.bags.columns import Columns, columns
 from limb_nodes.bags.types import RUN_INFO, absolute, limb_typestore
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.arrays import IntArray
 
 
 class BagReader:
@@ -124,7 +124,7 @@ class BagReader:
         rows = list(self._raw(connection))
         if not rows:
             raise UserError(f"{self.path}: topic {connection.topic} has no message")
-        stamps: npt.NDArray[np.int64] = np.array([stamp for stamp, _ in rows], dtype=np.int64)
+        stamps: IntArray = np.array([stamp for stamp, _ in rows], dtype=np.int64)
         try:
             fields = columns([data for _, data in rows], connection.msgtype, self._types(connection))
         except ValueError as error:

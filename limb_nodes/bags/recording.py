@@ -10,17 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from limb_nodes.bags.named_values import is_bag, read_named_values
-from limb_nodes.bags.table import (
-    TIME_UNITS,
-    FloatArray,
-    Table,
-    check_names,
-    delimiter_of,
-    parse_rows,
-    read_lines,
-    read_table,
-)
+from limb_nodes.bags.table import TIME_UNITS, Table, check_names, delimiter_of, parse_rows, read_lines, read_table
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.arrays import FloatArray
 
 RAW_TOPIC = "emg_raw"
 MOST_RATE = 1e6

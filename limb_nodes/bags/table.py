@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from limb_nodes.errors import UserError
-from limb_nodes.model.section import describe
-
-FloatArray = npt.NDArray[np.float64]
+from limb_nodes.foundation.arrays import FloatArray, IntArray
+from limb_nodes.foundation.section import describe
 
 TIME_UNITS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6}
 VOLTAGE_UNITS = frozenset({"V", "mV", "uV", "µV", "μV", "nV"})
@@ -39,7 +37,7 @@ class Table:
     names: tuple[str, ...]
     units: tuple[str, ...]
     values: FloatArray
-    lines: npt.NDArray[np.int64]
+    lines: IntArray
 
     def time_column(self) -> int | None:
         """Index of the column of times (named `time`, `timestamp` or `t`), or None."""
@@ -115,7 +113,7 @@ def check_names(path: str | Path, line: int, names: Sequence[str]) -> None:
 
 def parse_rows(
     path: str | Path, lines: Sequence[str], start: int, delimiter: str, names: Sequence[str]
-) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+) -> tuple[FloatArray, IntArray]:
     """Parse the rows of numbers below a header.
 
     lines: all lines of the file; start: index of the first line after the header.

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from limb_nodes.bags.table import FloatArray
 from limb_nodes.errors import UserError
-from limb_nodes.levels import Parameter
-from limb_nodes.model.section import Section, describe, read_yaml
+from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.foundation.section import Section, describe, read_yaml
 
 Numbers = Mapping[str, float]
 

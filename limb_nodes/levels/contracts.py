@@ -20,7 +20,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from limb_nodes.levels.equation import Equation, Law, Parameter, ScalarFunction, State
+from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.levels.equation import Equation, Law, ScalarFunction, State
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.section import Section
 from limb_nodes.levels.muscle.path import muscle_tendon_length
 from limb_nodes.levels.sarcomere.lengths import (
     maximum_sarcomere_length,
@@ -14,7 +15,6 @@ from limb_nodes.levels.sarcomere.lengths import (
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Muscle, Segment
 from limb_nodes.model.probe import Probe, given
-from limb_nodes.model.section import Section
 
 ANGLES = 181
 

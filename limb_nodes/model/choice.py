@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from limb_nodes.levels import CONTRACTS, REGISTRY, Law, Parameter
+from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.foundation.section import Section, one_line
+from limb_nodes.levels import CONTRACTS, REGISTRY, Law
 from limb_nodes.model.chosen import ChosenLaw
-from limb_nodes.model.section import Section, one_line
 from limb_nodes.model.user_code import import_user_module, user_folders
 
 

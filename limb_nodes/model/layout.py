@@ -14,16 +14,14 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limb_nodes.foundation.arrays import FloatArray, IntArray
 from limb_nodes.levels import Law
 from limb_nodes.levels.limb.chain import first_moment, own_inertia
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
 from limb_nodes.model.system import BoundEquation, System, muscle_system, unit_system
 
 Kind = TypeVar("Kind")
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 UNIT_PROCESSES = ("sarcomere", "force_length", "force_frequency", "passive_force", "recruitment")
 MUSCLE_PROCESSES = ("path", "tendon", "aponeurosis", "activation_dynamics")

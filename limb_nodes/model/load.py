@@ -11,14 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from limb_nodes.errors import UserError
-from limb_nodes.levels import Parameter, motor_unit, sarcomere
+from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.foundation.section import Section, parse_yaml, read_yaml, yaml_text
+from limb_nodes.levels import motor_unit, sarcomere
 from limb_nodes.levels.motor_unit.recruitment import unit_thresholds
 from limb_nodes.model.check import check_geometry, check_unit
 from limb_nodes.model.check_law import check_laws
 from limb_nodes.model.choice import choose_law, read_law
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
-from limb_nodes.model.section import Section, parse_yaml, read_yaml, yaml_text
 
 BASE_ANGLE = Parameter(
     "base_angle",

@@ -15,10 +15,11 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import root
 
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.levels.muscle.prescribed_path import prescribed
 from limb_nodes.levels.sarcomere.lengths import optimal_sarcomere_length
 from limb_nodes.model.chosen import ChosenLaw
-from limb_nodes.model.layout import FloatArray, build_layout
+from limb_nodes.model.layout import build_layout
 from limb_nodes.model.limb import Limb, Muscle, Segment
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import straight

@@ -11,7 +11,8 @@ from itertools import pairwise
 import numpy as np
 from numba import njit
 
-from limb_nodes.model.layout import GROUP_INDEX, MUSCLE_INDEX, UNIT_INDEX, FloatArray, Layout
+from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.model.layout import GROUP_INDEX, MUSCLE_INDEX, UNIT_INDEX, Layout
 from limb_nodes.solve.pointer import Callback, call
 from limb_nodes.solve.table import BUCKETS, NODES, TOLERANCE, Table, tabulate
 

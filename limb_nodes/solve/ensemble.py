@@ -15,7 +15,7 @@ from uuid import uuid4
 import numpy as np
 
 from limb_nodes.errors import UserError
-from limb_nodes.model.layout import FloatArray
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.limb import Limb
 from limb_nodes.model.load import build_limb
 from limb_nodes.solve.variants import Values, Variants

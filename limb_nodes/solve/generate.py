@@ -17,14 +17,7 @@ from limb_nodes.levels.tangent import (
     helper_functions,
     tangent_source,
 )
-from limb_nodes.model.layout import (
-    GROUP_INDEX,
-    MUSCLE_INDEX,
-    UNIT_INDEX,
-    Layout,
-    MuscleKind,
-    UnitKind,
-)
+from limb_nodes.model.layout import GROUP_INDEX, MUSCLE_INDEX, UNIT_INDEX, Layout, MuscleKind, UnitKind
 from limb_nodes.model.system import BoundEquation
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 

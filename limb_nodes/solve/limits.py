@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 from numba import carray
 
-from limb_nodes.model.layout import IntArray
+from limb_nodes.foundation.arrays import IntArray
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.method import STEP, take_step
 from limb_nodes.solve.pointer import call, callback, f8, i8, numbers, whole_numbers

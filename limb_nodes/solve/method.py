@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from limb_nodes.model.layout import IntArray
+from limb_nodes.foundation.arrays import IntArray
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.pointer import Callback, f8, i8, invoke, numbers, whole_numbers
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from limb_nodes.model.layout import FloatArray
+from limb_nodes.foundation.arrays import BoolArray, FloatArray
 
 # A corner: a second difference above this, and this much above those two samples away. A drive is at most 1 and
 # a smooth one sampled well below its period has second differences of the order of the period squared.
@@ -47,7 +46,7 @@ def bent(earlier, before, after):
     return found
 
 
-def corners(samples: FloatArray) -> NDArray[np.bool_]:
+def corners(samples: FloatArray) -> BoolArray:
     """Whether each sample [T, n] is a corner [T, n]."""
     count, width = samples.shape
     found = np.zeros(samples.size, dtype=np.bool_)
@@ -64,7 +63,7 @@ def corners(samples: FloatArray) -> NDArray[np.bool_]:
     return found.reshape(count, width)
 
 
-def slopes_of(samples: FloatArray, corner: NDArray[np.bool_]) -> FloatArray:
+def slopes_of(samples: FloatArray, corner: BoolArray) -> FloatArray:
     """Change per interval at every sample [T, n]: a central difference of fourth order.
 
     Of second order beside the corners [T, n] and next to the ends, one-sided at the ends.
@@ -106,7 +105,7 @@ def cubics(samples, n, slopes, corner, table):
         table[4 * at + 3] = start + end - 2.0 * rise
 
 
-def pieces(samples: FloatArray, sharp: NDArray[np.bool_] | None = None) -> FloatArray:
+def pieces(samples: FloatArray, sharp: BoolArray | None = None) -> FloatArray:
     """Table [T - 1, 4 n] of pieces through samples [T, n]; one sample is held.
 
     sharp: their `corners`, where they are known.

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from limb_nodes.model.layout import FloatArray
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve import limits
 from limb_nodes.solve.explicit import EXPLICIT

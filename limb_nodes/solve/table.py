@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from limb_nodes.model.layout import FloatArray, IntArray
+from limb_nodes.foundation.arrays import FloatArray, IntArray
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.pointer import call
 

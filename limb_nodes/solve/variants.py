@@ -16,10 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from limb_nodes.errors import UserError
-from limb_nodes.levels import Parameter, motor_unit, sarcomere
+from limb_nodes.foundation.arrays import IntArray
+from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.levels import motor_unit, sarcomere
 from limb_nodes.model.check import check_geometry
 from limb_nodes.model.chosen import ChosenLaw
-from limb_nodes.model.layout import GROUP_INDEX, MUSCLE_INDEX, UNIT_INDEX, IntArray, Layout, Packer, chain_block
+from limb_nodes.model.layout import GROUP_INDEX, MUSCLE_INDEX, UNIT_INDEX, Layout, Packer, chain_block
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
 from limb_nodes.model.load import BASE_ANGLE, SEGMENT_PARAMETERS, TIP_TORQUE, with_values
 from limb_nodes.solve.whole import WholeModel

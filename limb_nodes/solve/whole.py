@@ -9,7 +9,8 @@ from types import ModuleType
 import numpy as np
 
 from limb_nodes.errors import UserError
-from limb_nodes.model.layout import FloatArray, Layout, build_layout
+from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.model.layout import Layout, build_layout
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve import limits
 from limb_nodes.solve.compile import compiled

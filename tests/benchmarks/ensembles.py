@@ -13,8 +13,8 @@ from benchmarks.solving import PRODUCT, loosest, missing, product
 from benchmarks.table import Bar, Row
 from benchmarks.timing import alternate, median, ratio, timed
 from benchmarks.works import RATE, Work
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import with_values
-from limb_nodes.model.layout import FloatArray
 from limb_nodes.solve.ensemble import cores, simulate_ensemble
 
 OUTPUTS = 100

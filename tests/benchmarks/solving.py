@@ -18,7 +18,7 @@ from benchmarks.peers import mujoco_limb, opensim_arm, plain_python, scipy_lsoda
 from benchmarks.table import Bar, Row
 from benchmarks.timing import Spent, alternate, median, ratio, timed
 from benchmarks.works import RATE, WANTED, Work
-from limb_nodes.model.layout import FloatArray
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.solve.pieces import pieces
 
 PRODUCT = "limb_nodes"

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import Limb, load_limb, with_values
-from limb_nodes.model.layout import FloatArray
 from limb_nodes.model.load import build_limb
 from limb_nodes.model.shipped import shipped
 from limb_nodes.solve.whole import WholeModel

@@ -9,7 +9,7 @@ import numpy as np
 
 from limb_nodes.analysis.plot.panels import look_of
 from limb_nodes.analysis.plot.series import Run, Series
-from limb_nodes.analysis.plot.thin import FloatArray
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import Limb, Muscle
 from limb_nodes.model.points import points
 

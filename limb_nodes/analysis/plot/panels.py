@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from limb_nodes.analysis.plot.series import Run, Series
-from limb_nodes.analysis.plot.thin import FloatArray
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import Limb
 
 # Okabe and Ito's colours and one of Tol's, which the colour-blind tell apart; black and grey are for joints.

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from limb_nodes.foundation.arrays import FloatArray
+
 Indices = npt.NDArray[np.intp]
 
 # A panel is some 1000 dots wide; more bins than that cannot be seen.

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 
 from limb_nodes.analysis.structure.relations import Assembly, Relation, Term, Variable
-from limb_nodes.levels import CONTRACTS, Equation, Law, Parameter, motor_unit, muscle, sarcomere
+from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.levels import CONTRACTS, Equation, Law, motor_unit, muscle, sarcomere
 from limb_nodes.model import ChosenLaw, Limb, MotorUnit, Muscle
 from limb_nodes.model.layout import MUSCLE_PROCESSES, UNIT_PROCESSES
 from limb_nodes.model.system import UNIT_INPUTS, UNIT_PARAMETERS

@@ -6,8 +6,9 @@ length, 0.6 there; the report's longest length (2.2) is a strain of 0.593.
 
 import math
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import law, register
-from limb_nodes.levels.equation import Parameter, equation
+from limb_nodes.levels.equation import equation
 
 
 @register

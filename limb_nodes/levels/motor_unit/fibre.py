@@ -8,7 +8,8 @@ FL force_length_factor, FF force_frequency_factor, F_PE passive_force_factor,
 F_PE^max maximum_passive_force, f_min/f_max minimum/maximum_frequency.
 """
 
-from limb_nodes.levels.equation import Parameter, equation, equation_of
+from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.levels.equation import equation, equation_of
 
 
 @equation("2.13", "sarcomere_length")

@@ -2,8 +2,9 @@
 
 import math
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import law, register
-from limb_nodes.levels.equation import Parameter, equation
+from limb_nodes.levels.equation import equation
 
 
 @register

@@ -6,8 +6,9 @@ Many units join early and few late. All rise with the same slope, so early units
 greatest frequency before the last ones do. The muscle's activation_threshold plays no part.
 """
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import law, register
-from limb_nodes.levels.equation import Parameter, equation
+from limb_nodes.levels.equation import equation
 
 
 @register

@@ -7,8 +7,9 @@ starts at twice the actin length (2.1), the force ends at 2.2, and the two corne
 sarcomere move with the myosin, whose length is the difference of 2.2 and 2.1.
 """
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import law, register
-from limb_nodes.levels.equation import Parameter, equation
+from limb_nodes.levels.equation import equation
 
 
 @register

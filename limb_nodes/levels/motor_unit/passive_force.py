@@ -1,7 +1,8 @@
 """Passive force by fibre length (2.24). Report symbols: F_PE, l_F^slack slack_length."""
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import law, register
-from limb_nodes.levels.equation import Parameter, equation
+from limb_nodes.levels.equation import equation
 
 
 @register

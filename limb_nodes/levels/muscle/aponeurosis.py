@@ -13,8 +13,9 @@ so 2.29 serves only to derive the fibre velocity, and nothing drifts.
 
 import math
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, Parameter, State, equation, equation_of
+from limb_nodes.levels.equation import Law, State, equation, equation_of
 
 
 @equation("2.51", "pennation_angle")

@@ -6,8 +6,9 @@ l_M muscle_length along the line of pull, l_F fibre_length, v_M, v_F the shorten
 
 import math
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, Parameter, equation, equation_of
+from limb_nodes.levels.equation import Law, equation, equation_of
 
 
 @equation("alpha", "pennation_angle")

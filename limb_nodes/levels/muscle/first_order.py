@@ -3,8 +3,9 @@
 Symbols of the paper: u excitation, a activation, tau_act rise_time, tau_deact fall_time.
 """
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, Parameter, State, equation, equation_of
+from limb_nodes.levels.equation import Law, State, equation, equation_of
 
 
 @equation("Thelen 1-2", "activation_rate")

@@ -7,8 +7,9 @@ v_M+T muscle_tendon_velocity. role is +1 for a flexor and -1 for an extensor.
 
 import math
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, Parameter, equation, equation_of
+from limb_nodes.levels.equation import Law, equation, equation_of
 
 
 @equation("2.43-2.44", "muscle_tendon_length")

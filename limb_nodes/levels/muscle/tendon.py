@@ -4,8 +4,9 @@ Report symbols: l_T tendon_length, v_T tendon_velocity (positive when lengthenin
 F_T tendon_force, D_T stiffness, C_T damping, l_T^slack slack_length.
 """
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, Parameter, State, equation, equation_of
+from limb_nodes.levels.equation import Law, State, equation, equation_of
 
 
 @equation("2.30", "tendon_velocity")

@@ -7,8 +7,9 @@ The damper is the report's (2.30); without it the tendon's velocity would not fo
 
 import math
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, Parameter, equation, equation_of
+from limb_nodes.levels.equation import Law, equation, equation_of
 from limb_nodes.levels.muscle.tendon import DAMPING, INITIAL_LENGTH, LENGTH_STATE
 
 

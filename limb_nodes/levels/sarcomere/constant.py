@@ -1,7 +1,8 @@
 """A sarcomere whose force does not depend on its velocity, for tests of the levels above it."""
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, Parameter, equation, equation_of
+from limb_nodes.levels.equation import Law, equation, equation_of
 
 
 @equation("maximum_force", "maximum_sarcomere_force")

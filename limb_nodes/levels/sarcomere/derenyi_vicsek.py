@@ -11,8 +11,9 @@ F_S sarcomere_force.
 
 import math
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, Parameter, equation, equation_of
+from limb_nodes.levels.equation import Law, equation, equation_of
 
 
 @equation("2.5", "bound_probability")

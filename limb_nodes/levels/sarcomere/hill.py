@@ -4,8 +4,9 @@ Symbols of the paper: P sarcomere_force, P_0 maximum_force, a/P_0 curvature, v s
 v_max maximum_velocity.
 """
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, Parameter, equation, equation_of
+from limb_nodes.levels.equation import Law, equation, equation_of
 
 
 @equation("P_0", "maximum_sarcomere_force")

@@ -10,8 +10,9 @@ g_2 release, g_3 overstretch, h reach. Half a sarcomere shortens at half its vel
 
 import math
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, Parameter, State, equation, equation_of
+from limb_nodes.levels.equation import Law, State, equation, equation_of
 from limb_nodes.levels.sarcomere.bond_moments import loss_0, loss_1, loss_2
 
 # Bonds just made, as a share of all sites, that are always counted in: the mean length of no bonds

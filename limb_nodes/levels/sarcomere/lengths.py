@@ -4,7 +4,8 @@ Report symbols: l_myosin myosin_length, l_actin actin_length, l_S^opt optimal_sa
 l_S^max maximum_sarcomere_length, l_S^min minimum_sarcomere_length.
 """
 
-from limb_nodes.levels.equation import Parameter, equation, equation_of
+from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.levels.equation import equation, equation_of
 
 
 @equation("2.1", "optimal_sarcomere_length")

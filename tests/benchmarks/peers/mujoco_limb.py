@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import Limb
-from limb_nodes.model.layout import FloatArray
 
 STEP = 1e-3
 NAME = "MuJoCo Euler 1 ms"

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from limb_nodes.model.layout import FloatArray, UnitKind, muscle_values, unit_values
+from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.model.layout import UnitKind, muscle_values, unit_values
 from limb_nodes.model.system import BoundEquation
 from limb_nodes.solve.whole import WholeModel
 

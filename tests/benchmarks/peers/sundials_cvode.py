@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from limb_nodes.model.layout import FloatArray
+from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.solve.whole import WholeModel
 
 NAME = "sundae CVODE, compiled"

@@ -11,8 +11,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from limb_nodes.errors import UserError
-from limb_nodes.levels import Parameter
-from limb_nodes.levels.equation import is_finite
+from limb_nodes.foundation.parameter import Parameter, is_finite
 
 
 def read_yaml(path: Path) -> tuple[Any, str]:

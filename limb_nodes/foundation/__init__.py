@@ -1,0 +1,1 @@
+"""What everything else stands on: types of arrays, declared parameters, sections of YAML files."""
