@@ -8,244 +8,88 @@ weighted by `parallel_sarcomeres`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 
-from limb_nodes.foundation.arrays import FloatArray, IntArray
-from limb_nodes.levels import Law
-from limb_nodes.levels.limb.chain import first_moment, own_inertia
+from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.records import Record, copy_record, new_record, whole_numbers
+from limb_nodes.model.chain import chain_block
+from limb_nodes.model.kinds import MUSCLE_PROCESSES, UNIT_PROCESSES, MuscleKind, UnitKind
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
-from limb_nodes.model.system import BoundEquation, System, muscle_system, unit_system
+from limb_nodes.model.system import BoundEquation, System
 
 Kind = TypeVar("Kind")
 
-UNIT_PROCESSES = ("sarcomere", "force_length", "force_frequency", "passive_force", "recruitment")
-MUSCLE_PROCESSES = ("path", "tendon", "aponeurosis", "activation_dynamics")
-
-MUSCLE_INDEX = ("kind", "joint", "parameters", "state", "drive", "first", "last", "work")
-GROUP_INDEX = ("kind", "parameters", "state", "drive", "work")
-UNIT_INDEX = ("kind", "parameters", "group", "muscle")
+# Where a muscle's, a group's and a unit's numbers stand: its kind, and the first of its parameters, internal states,
+# drives and scratch numbers; of a muscle also its joint, its groups (from `group` to before `group_end`), and the end
+# of its states, those of its groups included.
+MUSCLE_RECORD = whole_numbers(
+    "kind", "joint", "parameters", "state", "state_end", "drive", "group", "group_end", "scratch"
+)
+GROUP_RECORD = whole_numbers("kind", "parameters", "state", "drive", "scratch")
+UNIT_RECORD = whole_numbers("kind", "parameters", "group", "muscle")
 
 # So many groups of a muscle get code of their own; more share a loop, which is slower and compiles faster.
 MOST_WRITTEN_OUT = 3
 
 
 @dataclass(frozen=True)
-class UnitKind:
-    """Motor units with the same laws, and what is computed when.
-
-    Stages: `load` once, `drive` once per input sample, `before` without and `loop` with the fibre
-    velocity, `rates` for the states. `columns` are the numbers kept per unit, `drives` those per
-    sample, `kept` what the later stages need from `before`.
-    """
-
-    laws: Mapping[str, Law]
-    steady_activation: bool
-
-    @cached_property
-    def system(self) -> System:
-        """The unit's equations."""
-        return unit_system(self.laws)
-
-    @cached_property
-    def stages(self) -> dict[str, list[BoundEquation]]:
-        """Equations by stage, each in the order of evaluation."""
-        depends = self.system.dependence()
-        stages: dict[str, list[BoundEquation]] = {stage: [] for stage in ("load", "drive", "before", "loop")}
-        for bound in self.system.ordered():
-            roots = depends[bound.defines]
-            if not roots:
-                stage = "load"
-            elif roots == {"activation"} and self.steady_activation:
-                stage = "drive"
-            elif "fibre_velocity" in roots:
-                stage = "loop"
-            else:
-                stage = "before"
-            stages[stage].append(bound)
-        return stages
-
-    @cached_property
-    def drives(self) -> list[str]:
-        """Variables of the drive stage that later stages use."""
-        return self.used_later("drive", ("before", "loop"))
-
-    @cached_property
-    def kept(self) -> list[str]:
-        """Variables and states that the loop stage and the unit's outputs need from before."""
-        states = [state.name for state, _ in self.system.states]
-        used = {symbol for bound in self.stages["loop"] for symbol in bound.symbols}
-        rates = {state.rate for state, _ in self.system.states} | {"fibre_force"}
-        before = [bound.defines for bound in self.stages["before"]]
-        available = [*before, *states, *self.drives, "fibre_length"]
-        return [name for name in available if name in used | rates]
-
-    @cached_property
-    def columns(self) -> list[str]:
-        """Parameters and computed parameters that compiled code reads."""
-        later = [b for stage in ("drive", "before", "loop") for b in self.stages[stage]]
-        used = {symbol for bound in later for symbol in bound.symbols}
-        loaded = [bound.defines for bound in self.stages["load"]]
-        return [name for name in (*self.system.parameters, *loaded) if name in used]
-
-    @property
-    def groupable(self) -> bool:
-        """Whether activity enters 2.25 alone, so that units may share an evaluation."""
-        return self.drives == ["force_frequency_factor"] and not any(
-            "force_frequency_factor" in bound.symbols and bound.defines != "fibre_force"
-            for bound in self.system.equations
-        )
-
-    def used_later(self, stage: str, later: tuple[str, ...]) -> list[str]:
-        """Variables of one stage that others use."""
-        used = {s for name in later for bound in self.stages[name] for s in bound.symbols}
-        return [bound.defines for bound in self.stages[stage] if bound.defines in used]
-
-
-@dataclass(frozen=True)
-class MuscleKind:
-    """Muscles with the same laws. Stages as in `UnitKind`; `loop` needs the total fibre force.
-
-    groups: the kinds of its groups of units, by index and in order; none where they are too many to be
-        written out one by one.
-    """
-
-    laws: Mapping[str, Law]
-    groups: tuple[int, ...] = ()
-
-    @cached_property
-    def system(self) -> System:
-        """The muscle's equations."""
-        return muscle_system(self.laws)
-
-    @cached_property
-    def steady_activation(self) -> bool:
-        """Whether the activation follows from the input alone."""
-        return self.system.dependence()["activation"] <= {"excitation"}
-
-    @cached_property
-    def closes_loop(self) -> bool:
-        """Whether the fibre velocity depends on the force that it is to give."""
-        return "total_fibre_force" in self.system.dependence()["fibre_velocity"]
-
-    @cached_property
-    def stages(self) -> dict[str, list[BoundEquation]]:
-        """Equations by stage, each in the order of evaluation."""
-        depends = self.system.dependence()
-        chain = self.upstream("fibre_velocity")
-        stages: dict[str, list[BoundEquation]] = {stage: [] for stage in ("load", "drive", "before", "loop", "after")}
-        for bound in self.system.ordered():
-            roots = depends[bound.defines]
-            if not roots:
-                stage = "load"
-            elif roots == {"excitation"}:
-                stage = "drive"
-            elif "total_fibre_force" not in roots:
-                stage = "before"
-            elif bound.defines in chain:
-                stage = "loop"
-            else:
-                stage = "after"
-            stages[stage].append(bound)
-        return stages
-
-    @cached_property
-    def drives(self) -> list[str]:
-        """What the muscle itself needs per sample beside its units' drives."""
-        used = {s for n in ("before", "loop", "after") for b in self.stages[n] for s in b.symbols}
-        available = ["excitation", *(bound.defines for bound in self.stages["drive"])]
-        return [name for name in available if name in used]
-
-    @cached_property
-    def columns(self) -> list[str]:
-        """Parameters and computed parameters that compiled code reads."""
-        later = [b for n in ("drive", "before", "loop", "after") for b in self.stages[n]]
-        used = {symbol for bound in later for symbol in bound.symbols}
-        loaded = [bound.defines for bound in self.stages["load"]]
-        outputs = {"tendon_length", "tendon_velocity", "pennation_angle", "moment_arm"}
-        used |= outputs & set(loaded)
-        return [name for name in (*self.system.parameters, *loaded) if name in used]
-
-    def upstream(self, variable: str) -> set[str]:
-        """Variables on which one depends, itself included."""
-        definitions = {bound.defines: bound for bound in self.system.equations}
-        found: set[str] = set()
-        waiting = [variable]
-        while waiting:
-            name = waiting.pop()
-            if name not in found and name in definitions:
-                found.add(name)
-                waiting += definitions[name].symbols
-        return found
-
-
-@dataclass(frozen=True)
 class Layout:
-    """A limb as flat arrays.
+    """A limb as the flat arrays that compiled code reads.
 
-    parameters: float64, first the chain's block, then a row per muscle, group and unit.
-    index: int64, one record per muscle (`MUSCLE_INDEX`), group (`GROUP_INDEX`) and unit
-        (`UNIT_INDEX`), in this order.
+    model: what does not change during a solve, one record with these fields:
+        chain: float64, the block that `chain_of` takes apart.
+        parameters: float64, a row per muscle, group and unit, SI units; which numbers, its kind tells (`columns`).
+        muscles, groups, units: one record for each, `MUSCLE_RECORD`, `GROUP_RECORD`, `UNIT_RECORD`.
     initial_states: float64 [internal states], initial values of tendons, aponeuroses and laws.
     state_names, state_scales: of the same.
+    drives: how many numbers the input becomes (`limb_nodes.solve.whole.WholeModel.drives`).
+    scratch: how many numbers muscles and groups keep from one stage of an evaluation to the next.
     """
 
     limb: Limb
     muscle_kinds: tuple[MuscleKind, ...]
     unit_kinds: tuple[UnitKind, ...]
-    parameters: FloatArray
-    index: IntArray
+    model: Record
     initial_states: FloatArray
     state_names: tuple[str, ...]
     state_scales: FloatArray
-    joints: int
-    muscles: int
-    groups: int
-    units: int
     drives: int
-    work: int
+    scratch: int
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.limb.segments)
+
+    @property
+    def muscles(self) -> int:
+        """Number of muscles."""
+        return len(self.model.muscles)
+
+    @property
+    def groups(self) -> int:
+        """Number of groups of motor units."""
+        return len(self.model.groups)
+
+    @property
+    def units(self) -> int:
+        """Number of motor units."""
+        return len(self.model.units)
 
     @property
     def states(self) -> int:
         """Number of internal states."""
         return len(self.state_names)
 
-
-def chain_block(limb: Limb) -> list[float]:
-    """Constants of the chain: base angle, gravity, couplings [n, n], then per segment first
-    moment, length, lowest and highest joint angle.
-    """
-    segments = limb.segments
-    count = len(segments)
-    distal = [sum(segment.mass for segment in segments[k + 1 :]) for k in range(count)]
-    moments = [first_moment(s.mass, s.com_distance, s.length, mass) for s, mass in zip(segments, distal, strict=True)]
-    couplings = [
-        own_inertia(
-            segments[k].inertia,
-            segments[k].mass,
-            segments[k].com_distance,
-            segments[k].length,
-            distal[k],
-        )
-        if k == p
-        else segments[min(k, p)].length * moments[max(k, p)]
-        for k in range(count)
-        for p in range(count)
-    ]
-    ranges = [segment.joint_range or (-np.inf, np.inf) for segment in segments]
-    return [
-        limb.base_angle,
-        *limb.gravity,
-        *couplings,
-        *moments,
-        *(segment.length for segment in segments),
-        *(lowest for lowest, _ in ranges),
-        *(highest for _, highest in ranges),
-    ]
+    def of_limb(self, limb: Limb) -> Layout:
+        """The layout of a limb that differs in its chain alone."""
+        model = copy_record(self.model)
+        model.chain[:] = chain_block(limb)
+        return replace(self, limb=limb, model=model)
 
 
 def evaluate(equations: list[BoundEquation], values: dict[str, float]) -> None:
@@ -287,26 +131,29 @@ def group_key(kind_index: int, kind: UnitKind, values: dict[str, float], number:
 
 
 class Packer:
-    """Collects rows of numbers and the index records that point at them."""
+    """Collects rows of numbers and the records that tell where they stand.
 
-    def __init__(self, limb: Limb) -> None:
+    known: a layout whose kinds need not be taken apart again.
+    """
+
+    def __init__(self, limb: Limb, known: Layout | None) -> None:
         self.limb = limb
-        self.numbers = chain_block(limb)
-        self.muscle_kinds: list[MuscleKind] = []
-        self.unit_kinds: list[UnitKind] = []
-        self.muscle_records: list[list[int]] = []
-        self.group_records: list[list[int]] = []
-        self.unit_records: list[list[int]] = []
+        self.parameters: list[float] = []
+        self.muscle_kinds = list(known.muscle_kinds) if known else []
+        self.unit_kinds = list(known.unit_kinds) if known else []
+        self.muscles: list[tuple[int, ...]] = []
+        self.groups: list[tuple[int, ...]] = []
+        self.units: list[tuple[int, ...]] = []
         self.initial: list[float] = []
         self.names: list[str] = []
         self.scales: list[float] = []
         self.drives = 0
-        self.work = 0
+        self.scratch = 0
 
     def row(self, columns: list[str], values: dict[str, float]) -> int:
         """Append a row; its offset."""
-        offset = len(self.numbers)
-        self.numbers += [values[name] for name in columns]
+        offset = len(self.parameters)
+        self.parameters += [values[name] for name in columns]
         return offset
 
     def add_states(self, system: System, values: dict[str, float], owner: str) -> int:
@@ -319,11 +166,11 @@ class Packer:
             self.scales.append(state.scale)
         return offset
 
-    def reserve(self, drives: int, work: int) -> tuple[int, int]:
+    def reserve(self, drives: int, scratch: int) -> tuple[int, int]:
         """Room for drives and scratch numbers; their offsets."""
-        offsets = self.drives, self.work
+        offsets = self.drives, self.scratch
         self.drives += drives
-        self.work += work
+        self.scratch += scratch
         return offsets
 
     def add_muscle(self, number: int, muscle: Muscle) -> None:
@@ -333,55 +180,94 @@ class Packer:
         values = muscle_values(muscle, kind)
         parameters = self.row(kind.columns, values)
         state = self.add_states(kind.system, values, muscle.name)
-        drive, work = self.reserve(len(kind.drives), 2)
-        first = len(self.group_records)
-        groups: dict[tuple[object, ...], int] = {}
-        totals: dict[int, dict[str, float]] = {}
-        for unit in muscle.units:
-            unit_kind = UnitKind({name: unit.laws[name].law for name in UNIT_PROCESSES}, kind.steady_activation)
-            unit_index, unit_kind = find_or_add(self.unit_kinds, unit_kind, lambda k: (k.laws, k.steady_activation))
-            unit_numbers = unit_values(unit, unit_kind)
-            key = group_key(unit_index, unit_kind, unit_numbers, len(self.unit_records))
-            if key in groups:
-                group = groups[key]
-                for name in SUMMED:
-                    totals[group][name] += unit_numbers[name]
-            else:
-                group = groups[key] = len(self.group_records)
-                totals[group] = dict(unit_numbers)
-                unit_state = self.add_states(unit_kind.system, unit_numbers, f"{muscle.name}.{unit.name}")
-                unit_drive, unit_work = self.reserve(len(unit_kind.drives), 2 * len(unit_kind.kept))
-                self.group_records.append([unit_index, 0, unit_state, unit_drive, unit_work])
-            self.unit_records.append([unit_index, self.row(unit_kind.columns, unit_numbers), group, number])
-        for group, summed in totals.items():
-            record = self.group_records[group]
-            record[1] = self.row(self.unit_kinds[record[0]].columns, summed)
-        kinds = tuple(record[0] for record in self.group_records[first:])
-        whole = MuscleKind(laws, kinds if len(kinds) <= MOST_WRITTEN_OUT else ())
+        # The total fibre force and its slope.
+        drive, scratch = self.reserve(len(kind.drives), 2)
+        group = len(self.groups)
+        group_kinds = self.add_units(number, muscle, kind.steady_activation)
+        whole = MuscleKind(laws, group_kinds if len(group_kinds) <= MOST_WRITTEN_OUT else ())
         kind_index, _ = find_or_add(self.muscle_kinds, whole, lambda known: (known.laws, known.groups))
-        self.muscle_records.append(
-            [kind_index, muscle.joint, parameters, state, drive, first, len(self.group_records), work]
+        self.muscles.append(
+            (
+                kind_index,
+                muscle.joint,
+                parameters,
+                state,
+                len(self.initial),
+                drive,
+                group,
+                len(self.groups),
+                scratch,
+            )
         )
+
+    def add_units(self, number: int, muscle: Muscle, steady_activation: bool) -> tuple[int, ...]:
+        """Append the units of a muscle and the groups that they form; the kinds of these groups, by index."""
+        groups: dict[tuple[object, ...], UnitGroup] = {}
+        first = len(self.groups)
+        for unit in muscle.units:
+            new = UnitKind({name: unit.laws[name].law for name in UNIT_PROCESSES}, steady_activation)
+            index, kind = find_or_add(self.unit_kinds, new, lambda known: (known.laws, known.steady_activation))
+            values = unit_values(unit, kind)
+            key = group_key(index, kind, values, len(self.units))
+            if key in groups:
+                groups[key].add(values)
+            else:
+                state = self.add_states(kind.system, values, f"{muscle.name}.{unit.name}")
+                drive, scratch = self.reserve(len(kind.drives), 2 * len(kind.kept))
+                groups[key] = UnitGroup(first + len(groups), index, dict(values), state, drive, scratch)
+            self.units.append((index, self.row(kind.columns, values), groups[key].number, number))
+        for group in groups.values():
+            offset = self.row(self.unit_kinds[group.kind].columns, group.values)
+            self.groups.append((group.kind, offset, group.state, group.drive, group.scratch))
+        return tuple(group.kind for group in groups.values())
 
     def layout(self) -> Layout:
         """The arrays."""
-        records = [*self.muscle_records, *self.group_records, *self.unit_records]
+        chain = chain_block(self.limb)
+        model = new_record(
+            np.dtype(
+                [
+                    ("chain", np.float64, chain.shape),
+                    ("parameters", np.float64, (len(self.parameters),)),
+                    ("muscles", MUSCLE_RECORD, (len(self.muscles),)),
+                    ("groups", GROUP_RECORD, (len(self.groups),)),
+                    ("units", UNIT_RECORD, (len(self.units),)),
+                ]
+            )
+        )
+        model.chain[:] = chain
+        model.parameters[:] = self.parameters
+        model.muscles[:] = self.muscles
+        model.groups[:] = self.groups
+        model.units[:] = self.units
         return Layout(
             limb=self.limb,
             muscle_kinds=tuple(self.muscle_kinds),
             unit_kinds=tuple(self.unit_kinds),
-            parameters=np.array(self.numbers, dtype=np.float64),
-            index=np.array([n for record in records for n in record], dtype=np.int64),
+            model=model,
             initial_states=np.array(self.initial, dtype=np.float64),
             state_names=tuple(self.names),
             state_scales=np.array(self.scales, dtype=np.float64),
-            joints=len(self.limb.segments),
-            muscles=len(self.muscle_records),
-            groups=len(self.group_records),
-            units=len(self.unit_records),
             drives=self.drives,
-            work=self.work,
+            scratch=self.scratch,
         )
+
+
+@dataclass
+class UnitGroup:
+    """Motor units that share one evaluation. values: by symbol; those in `SUMMED` are of all its units together."""
+
+    number: int
+    kind: int
+    values: dict[str, float]
+    state: int
+    drive: int
+    scratch: int
+
+    def add(self, values: dict[str, float]) -> None:
+        """Take in one more unit."""
+        for name in SUMMED:
+            self.values[name] += values[name]
 
 
 def find_or_add(kinds: list[Kind], new: Kind, key: Callable[[Kind], object]) -> tuple[int, Kind]:
@@ -393,9 +279,19 @@ def find_or_add(kinds: list[Kind], new: Kind, key: Callable[[Kind], object]) -> 
     return len(kinds) - 1, new
 
 
-def build_layout(limb: Limb) -> Layout:
-    """Put a limb's numbers into flat arrays."""
-    packer = Packer(limb)
+def build_layout(limb: Limb, known: Layout | None = None) -> Layout:
+    """Put a limb's numbers into flat arrays. known: a layout of the same laws, which saves taking them apart."""
+    packer = Packer(limb, known)
     for number, muscle in enumerate(limb.muscles):
         packer.add_muscle(number, muscle)
     return packer.layout()
+
+
+def same_structure(one: Layout, other: Layout) -> bool:
+    """Whether two limbs have one program and every number at the same place."""
+    return (
+        one.muscle_kinds == other.muscle_kinds
+        and one.unit_kinds == other.unit_kinds
+        and one.model.dtype == other.model.dtype
+        and all(np.array_equal(one.model[name], other.model[name]) for name in ("muscles", "groups", "units"))
+    )

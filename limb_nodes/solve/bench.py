@@ -19,7 +19,7 @@ from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.levels.muscle.prescribed_path import prescribed
 from limb_nodes.levels.sarcomere.lengths import optimal_sarcomere_length
 from limb_nodes.model.chosen import ChosenLaw
-from limb_nodes.model.layout import build_layout
+from limb_nodes.model.layout import build_layout, same_structure
 from limb_nodes.model.limb import Limb, Muscle, Segment
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import straight
@@ -156,7 +156,6 @@ class MuscleBench:
     def __init__(self, limb: Limb, muscle: str) -> None:
         self.limb, self.muscle = on_bench(limb, muscle)
         self.stepper = MuscleStepper(self.limb)
-        self.model: WholeModel = self.stepper.model
         self.state_names = tuple(name.removeprefix(f"{muscle}.") for name in self.model.layout.state_names)
         self.unit_names = tuple(unit.name for unit in self.muscle.units)
 
@@ -166,13 +165,16 @@ class MuscleBench:
         Far quicker than a new bench, for fits and scans. Raises ValueError where its laws or units differ.
         """
         changed, muscle = on_bench(limb, self.muscle.name)
-        old, new = self.model.layout, build_layout(changed)
-        if (old.muscle_kinds, old.unit_kinds) != (
-            new.muscle_kinds,
-            new.unit_kinds,
-        ) or old.index.tolist() != new.index.tolist():
+        new = build_layout(changed)
+        if not same_structure(self.model.layout, new):
             raise ValueError(f"{muscle.name} has other laws or units than the muscle on the bench")
-        self.limb, self.muscle, self.model.layout = changed, muscle, new
+        self.limb, self.muscle = changed, muscle
+        self.stepper.adopt(self.model.sibling(new))
+
+    @property
+    def model(self) -> WholeModel:
+        """The muscle as a limb of its own."""
+        return self.stepper.model
 
     def optimal_length(self) -> float:
         """Length (m) from origin to insertion at which fibres of mean optimal length hang on a slack tendon.
@@ -253,12 +255,12 @@ class MuscleBench:
         drive = self.model.drives(np.array([[excitation]]))
         held_drive = straight(drive[0], drive[0])
         scale = layout.state_scales
-        c = self.model.context(0.0, 1.0)
-        c[program.CUBIC : program.TORQUE] = [length, 0.0, length, 0.0]
+        data = self.model.new_data(0.0, 1.0)
+        data.angles_before[:] = data.angles_after[:] = length
 
         def rates(x: FloatArray) -> FloatArray:
             out = np.zeros_like(x)
-            program.muscle_rates(0.0, x, layout.parameters, layout.index, held_drive, c, out)
+            program.muscle_rates(0.0, x, held_drive, layout.model, data, out)
             return out / scale
 
         held = np.array([length]), np.zeros(1)
@@ -334,9 +336,8 @@ class MuscleBench:
         self.model.program.observe_all(
             np.ascontiguousarray(np.column_stack([length, rate, internal])),
             np.ascontiguousarray(excitation[:, np.newaxis]),
-            layout.parameters,
-            layout.index,
-            self.model.context(0.0, 1.0),
+            layout.model,
+            self.model.new_data(0.0, 1.0),
             muscle,
             unit,
         )

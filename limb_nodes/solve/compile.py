@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import inspect
 import os
 import sys
 import tempfile
@@ -14,14 +15,19 @@ from types import ModuleType
 
 import numba
 
+from limb_nodes.model import chain as model_chain
 from limb_nodes.model.layout import Layout
-from limb_nodes.solve import chain
+from limb_nodes.solve import chain, held
 from limb_nodes.solve.generate import program
 
 IMPORTS = (
-    "from limb_nodes.solve.chain import acceleration, bias_slopes, impact, reaction, substitute\n"
-    "from limb_nodes.solve.pointer import Callback\n\n\n"
+    "from limb_nodes.solve.chain import acceleration, bias_slopes, constants, impact, reaction, solve_with_factor\n"
+    "from limb_nodes.solve.held import held_torque\n"
+    "from limb_nodes.solve.pointer import callback\n"
+    "from limb_nodes.solve.problem import arguments_of\n"
 )
+# Modules whose functions become a part of every program.
+COMPILED_IN = (model_chain, chain, held)
 
 
 def cache_folder() -> Path:
@@ -42,15 +48,13 @@ def cache_folder() -> Path:
 def static_sources() -> tuple[str, str]:
     """Text of the entry points, and a text that changes with all other code that is compiled in."""
     entries = resources.files("limb_nodes.solve").joinpath("entries.py.in").read_text("utf-8")
-    chain_file = chain.__file__
-    assert chain_file is not None
-    return entries, Path(chain_file).read_text("utf-8") + numba.__version__
+    return entries, "".join(inspect.getsource(module) for module in COMPILED_IN) + numba.__version__
 
 
 def compiled(layout: Layout) -> ModuleType:
     """The module of a limb's program; limbs of the same structure share one."""
     entries, other = static_sources()
-    text = program(layout, IMPORTS + entries)
+    text = program(layout, IMPORTS, entries)
     name = "limb_program_" + hashlib.sha256((text + other).encode()).hexdigest()[:20]
     if name in sys.modules:
         return sys.modules[name]

@@ -12,16 +12,20 @@ import numpy as np
 from numba import njit
 
 from limb_nodes.foundation.arrays import FloatArray
-from limb_nodes.model.layout import GROUP_INDEX, MUSCLE_INDEX, UNIT_INDEX, Layout
-from limb_nodes.solve.pointer import Callback, call
-from limb_nodes.solve.table import BUCKETS, NODES, TOLERANCE, Table, tabulate
-
-_NO_INPUT = np.empty((1, 1))
+from limb_nodes.foundation.records import Record
+from limb_nodes.model.layout import Layout
+from limb_nodes.solve.pointer import Callback
+from limb_nodes.solve.problem import evaluate, new_problem
+from limb_nodes.solve.table import BUCKETS, NODES, TOLERANCE, Table, Wanted, tabulate
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def look_up(edges, table, starts, muscle_drive, muscle, p, k, first, last, excitation, out):
-    """Fill columns first to last of out [T, drives] for a muscle's excitation [T]."""
+def look_up(edges, table, starts, problem, muscle, span, excitation, out):
+    """Fill the columns of a span (first, end) of out [T, drives] for a muscle's excitation [T].
+
+    edges, table, starts: of its `Table`. problem: its rates are the drives by the laws.
+    """
+    first, last = span
     owner = np.full(1, float(muscle))
     scratch = np.empty(out.shape[1])
     before = np.nan
@@ -47,7 +51,7 @@ def look_up(edges, table, starts, muscle_drive, muscle, p, k, first, last, excit
                 out[row, j] = value
                 known = known and value == value
         if not known:
-            call(muscle_drive, a, owner, p, k, _NO_INPUT, scratch, scratch)
+            evaluate(problem.rates, a, owner, problem, scratch)
             for j in range(first, last):
                 out[row, j] = scratch[j]
 
@@ -60,52 +64,31 @@ class DriveTable:
 
     def __init__(self, layout: Layout, unit_drive: Callback, muscle_drive: Callback) -> None:
         self._layout = layout
-        self._unit, self._muscle = unit_drive, muscle_drive
-        muscles = layout.muscles * len(MUSCLE_INDEX)
-        units = layout.index[muscles + layout.groups * len(GROUP_INDEX) :].reshape(-1, len(UNIT_INDEX))
-        self._owners = units[:, UNIT_INDEX.index("muscle")]
-        records = layout.index[:muscles].reshape(-1, len(MUSCLE_INDEX))
-        firsts = [*records[:, MUSCLE_INDEX.index("drive")].tolist(), layout.drives]
-        self._drives = list(pairwise(firsts))
-        self.tables = [self.tabulated(muscle) for muscle in range(layout.muscles)]
+        self._of_unit = self._problem(unit_drive)
+        self._of_muscle = self._problem(muscle_drive)
+        self._spans = list(pairwise([*layout.model.muscles["drive"].tolist(), layout.drives]))
+        self.tables = [self._tabulated(muscle) for muscle in range(layout.muscles)]
 
-    def tabulated(self, muscle: int) -> Table:
+    def _problem(self, drive: Callback) -> Record:
+        """A function of one owner's excitation, as a problem whose rates are the drives."""
+        model = self._layout.model
+        return new_problem(self._layout.drives, drive.address, model, model)
+
+    def _tabulated(self, muscle: int) -> Table:
         """The table of one muscle and its units."""
-        units = np.flatnonzero(self._owners == muscle)
+        units = np.flatnonzero(self._layout.model.units["muscle"] == muscle)
         # A muscle's only unit need not be looked at alone.
-        single = self._muscle.address, np.array([muscle])
-        searched = single if units.size == 1 else (self._unit.address, units)
-        first, last = self._drives[muscle]
-        return tabulate(
-            self._muscle.address,
-            muscle,
-            searched,
-            self._layout.parameters,
-            self._layout.index,
-            (first, last),
-            self._layout.drives,
-            (0.0, 1.0),
-            # A drive is at most of the order of 1.
-            np.ones(last - first),
-            # Rounding grows with the number of units that are summed.
-            TOLERANCE * max(1.0, 0.1 * units.size),
-        )
+        single = self._of_muscle, np.array([muscle])
+        searched = single if units.size == 1 else (self._of_unit, units)
+        first, last = self._spans[muscle]
+        # A drive is at most of the order of 1. Rounding grows with the number of units that are summed.
+        wanted = Wanted((first, last), (0.0, 1.0), np.ones(last - first), TOLERANCE * max(1.0, 0.1 * units.size))
+        return tabulate(self._of_muscle, muscle, searched, wanted)
 
     def look_up(self, excitation: FloatArray) -> FloatArray:
         """Drives [T, drives] of excitations [T, muscles]."""
-        layout = self._layout
-        out = np.empty((len(excitation), layout.drives))
-        for muscle, (table, wanted) in enumerate(zip(self.tables, self._drives, strict=True)):
-            look_up(
-                table.edges,
-                table.coefficients,
-                table.starts,
-                self._muscle.address,
-                muscle,
-                layout.parameters,
-                layout.index,
-                *wanted,
-                np.ascontiguousarray(excitation[:, muscle]),
-                out,
-            )
+        out = np.empty((len(excitation), self._layout.drives))
+        for muscle, (table, span) in enumerate(zip(self.tables, self._spans, strict=True)):
+            own = np.ascontiguousarray(excitation[:, muscle])
+            look_up(table.edges, table.coefficients, table.starts, self._of_muscle, muscle, span, own, out)
         return out

@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import islice
+from threading import Lock
 from typing import Any, TypeVar
 from uuid import uuid4
 
@@ -19,7 +19,7 @@ from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.limb import Limb
 from limb_nodes.model.load import build_limb
 from limb_nodes.solve.variants import Values, Variants
-from limb_nodes.solve.whole import METHODS, TOLERANCE, Movement, WholeModel, prepared
+from limb_nodes.solve.whole import METHODS, TOLERANCE, Movement, Stretch, WholeModel, prepared
 
 Samples = Iterable[Values] | Mapping[str, FloatArray]
 Task = TypeVar("Task")
@@ -94,8 +94,8 @@ class Ensemble:
                 )
             same = self.variants.same_drives(model)
             inputs, stops = self.inputs if same else self.prepared(model)
-            context = model.context(0.0, self.period)
-            states, steps = model.solve(self.times, inputs, stops, context, order.tolerance, self.method)
+            stretch = Stretch(self.times, inputs, stops, self.period)
+            states, steps = model.solve(stretch, order.tolerance, self.method)
             n, first = model.layout.joints, int(self.early)
             kept = states[first:]
             return Solution(self.times[first:], kept[:, :n], kept[:, n : 2 * n], kept[:, 2 * n :], steps)
@@ -236,29 +236,31 @@ def flow(
         yield chosen
 
 
-@lru_cache(maxsize=4)
-def ensemble_of(token: str, holder: OrderHolder) -> Ensemble:
-    """An ensemble that a worker keeps from chunk to chunk."""
-    return Ensemble(holder.order, holder.order.limb())
+class Workshop:
+    """The ensembles that a worker of a cluster keeps from chunk to chunk, by the token of their order."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._lock = Lock()
+        self._ensembles: dict[str, Ensemble] = {}
+
+    def ensemble(self, token: str, order: Order) -> Ensemble:
+        """That of an order, built if it is not there; the oldest gives way."""
+        with self._lock:
+            if token not in self._ensembles:
+                while len(self._ensembles) >= self._most:
+                    del self._ensembles[next(iter(self._ensembles))]
+                self._ensembles[token] = Ensemble(order, order.limb())
+            return self._ensembles[token]
 
 
-class OrderHolder:
-    """An order that counts as equal to any other, for a cache that goes by its token."""
-
-    def __init__(self, order: Order) -> None:
-        self.order = order
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, OrderHolder)
-
-    def __hash__(self) -> int:
-        return 0
+WORKSHOP = Workshop(4)
 
 
 def solve_chunk(token: str, order: Order, chunk: list[tuple[int, Values]]) -> list[tuple[int, Any]]:
     """What a worker of a cluster does."""
     try:
-        ensemble = ensemble_of(token, OrderHolder(order))
+        ensemble = WORKSHOP.ensemble(token, order)
     except Exception as problem:
         return [(index, problem) for index, _ in chunk]
     return [(index, ensemble.solve(values)) for index, values in chunk]

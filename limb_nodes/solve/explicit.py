@@ -1,108 +1,124 @@
-"""One step of the method of Dormand and Prince of order 5(4), compiled.
+"""Explicit Runge-Kutta methods whose last stage is the first of the next step, compiled.
 
-Coefficients, error estimate and interpolant: Hairer, Norsett and Wanner, Solving Ordinary
-Differential Equations I, II.5 and II.6.
+Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, II.1 (tableau), II.4 (error
+estimate) and II.6 (continuous extension).
 """
 
 from __future__ import annotations
 
-import math
+from typing import Any, NamedTuple
 
+import numpy as np
 from numba import carray
 
-from limb_nodes.solve.method import BETWEEN, ERROR, STEP, Method
-from limb_nodes.solve.pointer import call, callback
+from limb_nodes.solve.inner import inner
+from limb_nodes.solve.method import BETWEEN, STEP, Method, judge
+from limb_nodes.solve.pointer import callback, numbers_at
+from limb_nodes.solve.problem import evaluate, work_of, work_rows
+
+
+class Explicit(NamedTuple):
+    """The tableau of a method of s stages; a step from y is y + h (weights of a row) (rates of the stages).
+
+    stages: [s, s], below the diagonal; the last row is the step itself.
+    nodes: [s], the time of each stage as a part of the step. error: [s], of the estimated error.
+    bend: [s], of the term of fourth order in the continuous extension, which otherwise is the cubic
+    through the states and rates of both ends.
+    """
+
+    stages: Any
+    nodes: Any
+    error: Any
+    bend: Any
+
+
+# Dormand and Prince, order 5(4).
+DORMAND_PRINCE = Explicit(
+    stages=np.array(
+        [
+            [0, 0, 0, 0, 0, 0, 0],
+            [1 / 5, 0, 0, 0, 0, 0, 0],
+            [3 / 40, 9 / 40, 0, 0, 0, 0, 0],
+            [44 / 45, -56 / 15, 32 / 9, 0, 0, 0, 0],
+            [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0, 0, 0],
+            [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0, 0],
+            [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0],
+        ]
+    ),
+    nodes=np.array([0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1]),
+    error=np.array([71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40]),
+    bend=np.array(
+        [
+            -12715105075 / 11282082432,
+            0,
+            87487479700 / 32700410799,
+            -10690763975 / 1880347072,
+            701980252875 / 199316789632,
+            -1453857185 / 822651844,
+            69997945 / 29380423,
+        ]
+    ),
+)
+
+
+@inner
+def tableau_of(method):
+    """The tableau of a method."""
+    s = method.stages
+    rows = carray(numbers_at(method.tableau), (s + 3, s))
+    return Explicit(rows[:s], rows[s], rows[s + 1], rows[s + 2])
+
+
+@inner
+def combine(weights, stages, count, i):
+    """Sum over the first `count` stages of weight times rate of state i."""
+    total = weights[0] * stages[0, i]
+    for stage in range(1, count):
+        total += weights[stage] * stages[stage, i]
+    return total
 
 
 @callback(*STEP)
-def step(rates, t, h, n, rows, y_, start_rates_, slopes_, stages_, p_, k_, u_, c_, stage_y_, new_y_, matrix_, pivots_):
-    """One step of size h; stages[0] holds the rates at t, stages[6] then those at t + h."""
-    y, start_rates, stages = carray(y_, (n,)), carray(start_rates_, (n,)), carray(stages_, (7, n))
-    stage_y, new_y = carray(stage_y_, (n,)), carray(new_y_, (n,))
-    p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
+def step(t, h, method_, work_, control_, problem_):
+    """One step of size h; the first stage holds the rates at t, the last then those at t + h."""
+    method, control, problem = carray(method_, 1)[0], carray(control_, 1)[0], carray(problem_, 1)[0]
+    n, tableau = problem.states, tableau_of(method)
+    work = work_of(carray(work_, (work_rows(problem, method), n)), problem, method)
     for i in range(n):
-        stages[0, i] = start_rates[i]
+        work.stages[0, i] = work.start_rates[i]
+    # The second stage is a part of a step by Euler's method.
     for i in range(n):
-        stage_y[i] = y[i] + h * 0.2 * stages[0, i]
-    call(rates, t + 0.2 * h, stage_y, p, k, u, c, stages[1])
+        work.stage_state[i] = work.state[i] + h * tableau.nodes[1] * work.start_rates[i]
+    evaluate(problem.rates, t + tableau.nodes[1] * h, work.stage_state, problem, work.stages[1])
+    for stage in range(2, method.stages):
+        state = work.stage_state if stage < method.stages - 1 else work.new_state
+        for i in range(n):
+            state[i] = work.state[i] + h * combine(tableau.stages[stage], work.stages, stage, i)
+        evaluate(problem.rates, t + tableau.nodes[stage] * h, state, problem, work.stages[stage])
+    # The rates have been asked for: their place is free.
+    errors = work.stage_state
     for i in range(n):
-        stage_y[i] = y[i] + h * (3.0 / 40.0 * stages[0, i] + 9.0 / 40.0 * stages[1, i])
-    call(rates, t + 0.3 * h, stage_y, p, k, u, c, stages[2])
-    for i in range(n):
-        stage_y[i] = y[i] + h * (44.0 / 45.0 * stages[0, i] - 56.0 / 15.0 * stages[1, i] + 32.0 / 9.0 * stages[2, i])
-    call(rates, t + 0.8 * h, stage_y, p, k, u, c, stages[3])
-    for i in range(n):
-        stage_y[i] = y[i] + h * (
-            19372.0 / 6561.0 * stages[0, i]
-            - 25360.0 / 2187.0 * stages[1, i]
-            + 64448.0 / 6561.0 * stages[2, i]
-            - 212.0 / 729.0 * stages[3, i]
-        )
-    call(rates, t + 8.0 / 9.0 * h, stage_y, p, k, u, c, stages[4])
-    for i in range(n):
-        stage_y[i] = y[i] + h * (
-            9017.0 / 3168.0 * stages[0, i]
-            - 355.0 / 33.0 * stages[1, i]
-            + 46732.0 / 5247.0 * stages[2, i]
-            + 49.0 / 176.0 * stages[3, i]
-            - 5103.0 / 18656.0 * stages[4, i]
-        )
-    call(rates, t + h, stage_y, p, k, u, c, stages[5])
-    for i in range(n):
-        new_y[i] = y[i] + h * (
-            35.0 / 384.0 * stages[0, i]
-            + 500.0 / 1113.0 * stages[2, i]
-            + 125.0 / 192.0 * stages[3, i]
-            - 2187.0 / 6784.0 * stages[4, i]
-            + 11.0 / 84.0 * stages[5, i]
-        )
-    call(rates, t + h, new_y, p, k, u, c, stages[6])
-
-
-@callback(*ERROR)
-def error_norm(h, tolerance, n, y_, new_y_, stages_, scale_, found):
-    """Largest estimated error over its tolerance."""
-    y, new_y, stages, scale = carray(y_, (n,)), carray(new_y_, (n,)), carray(stages_, (7, n)), carray(scale_, (n,))
-    worst = 0.0
-    for i in range(n):
-        error = h * (
-            71.0 / 57600.0 * stages[0, i]
-            - 71.0 / 16695.0 * stages[2, i]
-            + 71.0 / 1920.0 * stages[3, i]
-            - 17253.0 / 339200.0 * stages[4, i]
-            + 22.0 / 525.0 * stages[5, i]
-            - 1.0 / 40.0 * stages[6, i]
-        )
-        size = max(scale[i], abs(y[i]), abs(new_y[i]))
-        ratio = abs(error) / (tolerance * size)
-        if not ratio <= worst:
-            worst = ratio
-        if not math.isfinite(worst):
-            break
-    found[0] = worst
+        errors[i] = h * combine(tableau.error, work.stages, method.stages, i)
+    judge(errors, work, control)
 
 
 @callback(*BETWEEN)
-def interpolate(t, h, n, count, times_, y_, new_y_, stages_, out_):
+def between(t, h, count, times_, out_, method_, work_, problem_):
     """States at times from t to t + h, of fourth order."""
-    y, new_y, stages = carray(y_, (n,)), carray(new_y_, (n,)), carray(stages_, (7, n))
+    method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
+    n, tableau = problem.states, tableau_of(method)
+    work = work_of(carray(work_, (work_rows(problem, method), n)), problem, method)
     times, out = carray(times_, (count,)), carray(out_, (count, n))
+    last = method.stages - 1
     for i in range(n):
-        difference = new_y[i] - y[i]
-        bend = h * stages[0, i] - difference
-        twist = difference - h * stages[6, i] - bend
-        fourth = h * (
-            -12715105075.0 / 11282082432.0 * stages[0, i]
-            + 87487479700.0 / 32700410799.0 * stages[2, i]
-            - 10690763975.0 / 1880347072.0 * stages[3, i]
-            + 701980252875.0 / 199316789632.0 * stages[4, i]
-            - 1453857185.0 / 822651844.0 * stages[5, i]
-            + 69997945.0 / 29380423.0 * stages[6, i]
-        )
+        difference = work.new_state[i] - work.state[i]
+        bend = h * work.stages[0, i] - difference
+        twist = difference - h * work.stages[last, i] - bend
+        fourth = h * combine(tableau.bend, work.stages, method.stages, i)
         for row in range(count):
             part = min(1.0, (times[row] - t) / h)
             rest = 1.0 - part
-            out[row, i] = y[i] + part * (difference + rest * (bend + part * (twist + rest * fourth)))
+            out[row, i] = work.state[i] + part * (difference + rest * (bend + part * (twist + rest * fourth)))
 
 
-EXPLICIT = Method(step, error_norm, interpolate)
+EXPLICIT = Method(step, between, np.vstack(DORMAND_PRINCE), len(DORMAND_PRINCE.nodes), implicit=False)

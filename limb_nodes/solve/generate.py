@@ -10,6 +10,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from limb_nodes.levels.equation import ScalarFunction
 from limb_nodes.levels.tangent import (
     function_tree,
@@ -17,14 +19,58 @@ from limb_nodes.levels.tangent import (
     helper_functions,
     tangent_source,
 )
-from limb_nodes.model.layout import GROUP_INDEX, MUSCLE_INDEX, UNIT_INDEX, Layout, MuscleKind, UnitKind
+from limb_nodes.model.kinds import MuscleKind, UnitKind
+from limb_nodes.model.layout import Layout
 from limb_nodes.model.system import BoundEquation
+from limb_nodes.solve.data import data_type
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 
+# The arguments of all functions that are generated, one of each for every kind of muscle or motor unit.
+# own: the record of the muscle, the group or (drive, observe) the motor unit; of the muscle in the functions `units_`,
+#   which run over its groups. group: the record of the unit's group.
+# fibre_length, activation, ...: numbers (SI), and with d_ in front their tangents.
+# internal, rates: internal states of the limb and, to be filled in, their rates.
+# model, data: see `Layout` and `data_type`.
+# out: what is filled in: drives, or a row of what is shown.
+ARGUMENTS = {
+    "unit_drive": "own, activation, group, model, out",
+    "unit_before": "own, fibre_length, activation, internal, model, data",
+    "unit_before_t": "own, fibre_length, d_fibre_length, activation, d_activation, internal, model, data",
+    "unit_force": "own, fibre_velocity, d_fibre_velocity, model, data",
+    "unit_force_t": "own, fibre_velocity, d_fibre_velocity, model, data",
+    "unit_rates": "own, fibre_velocity, rates, model, data",
+    "unit_rates_t": "own, fibre_velocity, d_fibre_velocity, model, data",
+    "unit_observe": "own, fibre_length, fibre_velocity, activation, internal, group, model, out",
+    "muscle_drive": "own, excitation, model, out",
+    "muscle": "own, joint_angle, joint_velocity, internal, rates, model, data",
+    "muscle_t": "own, joint_angle, d_joint_angle, joint_velocity, d_joint_velocity, internal, model, data",
+    "muscle_observe": "own, joint_angle, joint_velocity, excitation, internal, model, data, out",
+}
+
+PRELUDE = "import math\n\nimport numpy as np\nfrom numba import carray, from_dtype, njit\n"
+DECORATORS = """
 # Never called from Python: entries for that would take a part of the time to compile.
-INLINE = '@njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)\n'
-# With many arrays among its arguments, a call takes as long as an exponential.
-FORCED = INLINE.replace(")\n", ", forceinline=True)\n")
+inline = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+forced = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
+entry = njit(error_model="numpy", cache=True, nogil=True)
+"""
+
+
+def numbered(name: str, number: int) -> str:
+    """The function `name` of one kind: unit_drive of kind 2 is unit2_drive."""
+    level, _, what = name.partition("_")
+    return f"{level}{number}_{what}".rstrip("_")
+
+
+def call(name: str, number: int, **others: str) -> str:
+    """A call of the function `name` of one kind with the variables of its arguments' names, or with others."""
+    given = (others.get(argument, argument) for argument in ARGUMENTS[name].split(", "))
+    return f"{numbered(name, number)}({', '.join(given)})"
+
+
+def call_loop(name: str, **others: str) -> str:
+    """A call of the loop of `name` over a muscle's groups."""
+    return call(name, 0, **others).replace("unit0", "units", 1)
 
 
 class Equations:
@@ -40,7 +86,7 @@ class Equations:
         key = (function, active)
         if key not in self.names:
             self.names[key] = f"e{len(self.names)}_{function.__name__}"
-            self.texts.append(INLINE + self.text(function, active, self.names[key]))
+            self.texts.append("@inline\n" + self.text(function, active, self.names[key]))
         return self.names[key]
 
     def text(self, function: ScalarFunction, active: frozenset[str], name: str) -> str:
@@ -69,13 +115,13 @@ class Body:
         """Append lines of the function's body."""
         self.lines += [f"    {line}" for line in lines]
 
-    def load(self, names: list[str], used: set[str], source: str) -> None:
-        """Read those of `names` that are used from an array, `source` + position."""
-        self.add(*(f"{n} = {source}{i}]" for i, n in enumerate(names) if n in used))
+    def load(self, names: list[str], used: set[str], array: str, offset: str, prefix: str = "") -> None:
+        """Read those of `names` that are used from an array, from its place `offset` on. prefix: of the variables."""
+        self.add(*(f"{prefix}{n} = {array}[{offset} + {i}]" for i, n in enumerate(names) if n in used))
 
-    def load_tangents(self, names: list[str], used: set[str], source: str) -> None:
+    def load_tangents(self, names: list[str], used: set[str], array: str, offset: str) -> None:
         """The same for their tangents; the variables become active."""
-        self.add(*(f"d_{n} = {source}{i}]" for i, n in enumerate(names) if n in used))
+        self.load(names, used, array, offset, "d_")
         self.active |= set(names) & used
 
     def compute(self, bound: Iterable[BoundEquation], indent: str = "") -> None:
@@ -101,9 +147,13 @@ class Body:
         """The tangent of a variable as text."""
         return f"d_{name}" if name in self.active else "0.0"
 
-    def function(self, name: str, arguments: str) -> str:
-        """The whole text."""
-        return "\n".join([f"{INLINE}def {name}({arguments}):", *self.lines]) + "\n"
+    def function(self, name: str, number: int) -> str:
+        """The whole text of the function `name` of one kind."""
+        return self.text(numbered(name, number), ARGUMENTS[name])
+
+    def text(self, name: str, arguments: str) -> str:
+        """The whole text of a function."""
+        return "\n".join([f"@inline\ndef {name}({arguments}):", *self.lines]) + "\n"
 
 
 def used_by(*stages: Iterable[BoundEquation]) -> set[str]:
@@ -121,17 +171,18 @@ def upstream(bound: list[BoundEquation], wanted: set[str]) -> list[BoundEquation
     return kept[::-1]
 
 
-def unit_functions(equations: Equations, number: int, kind: UnitKind) -> list[str]:
-    """Functions of one kind of motor unit."""
+def unit_functions(equations: Equations, number: int, kind: UnitKind, looped: bool) -> list[str]:
+    """Functions of one kind of motor unit. looped: whether a muscle's groups are not written out."""
     states = [state.name for state, _ in kind.system.states]
     rates = [state.rate for state, _ in kind.system.states]
-    texts = [unit_drive(equations, number, kind)]
-    texts += unit_force(equations, number, kind)
-    texts.append(unit_loop(equations, number, kind, ["fibre_force"], "force", True))
+    texts = [unit_drive(equations, number, kind), unit_force_of(equations, number, kind)]
+    if looped:
+        texts.append(unit_force(equations, number, kind))
+    texts.append(unit_force_t(equations, number, kind))
     for tangent in (False, True):
         texts.append(unit_before(equations, number, kind, states, tangent))
         if states:
-            texts.append(unit_loop(equations, number, kind, rates, "rates", tangent))
+            texts.append(unit_rates(equations, number, kind, rates, tangent))
     texts.append(unit_observe(equations, number, kind, states))
     return texts
 
@@ -140,102 +191,98 @@ def unit_drive(equations: Equations, number: int, kind: UnitKind) -> str:
     """Drive stage: writes the unit's share of its group's drives."""
     body = Body(equations)
     stage = kind.stages["drive"]
-    body.load(kind.columns, used_by(stage) | {"parallel_sarcomeres"}, "p[o + ")
+    body.load(kind.columns, used_by(stage) | {"parallel_sarcomeres"}, "model.parameters", "own.parameters")
     if "parallel_sarcomeres" not in kind.columns:
         body.add("parallel_sarcomeres = 1.0")
     body.compute(stage)
     if kind.groupable:
         column = kind.columns.index("parallel_sarcomeres")
-        body.add(f"out[do] += force_frequency_factor * parallel_sarcomeres / p[group + {column}]")
+        whole = f"model.parameters[group.parameters + {column}]"
+        body.add(f"out[group.drive] += force_frequency_factor * parallel_sarcomeres / {whole}")
     else:
-        body.add(*(f"out[do + {i}] = {name}" for i, name in enumerate(kind.drives)))
+        body.add(*(f"out[group.drive + {i}] = {name}" for i, name in enumerate(kind.drives)))
     body.add("return 0")
-    return body.function(f"unit{number}_drive", "activation, p, o, group, do, out")
+    return body.function("unit_drive", number)
 
 
 def unit_before(equations: Equations, number: int, kind: UnitKind, states: list[str], tangent: bool) -> str:
-    """Before stage: what does not need the fibre velocity goes into w."""
+    """Before stage: what does not need the fibre velocity goes into the scratch numbers."""
     body = Body(equations)
     stage = kind.stages["before"]
     used = used_by(stage) | set(kind.kept)
-    body.load(kind.columns, used, "p[o + ")
-    body.load(kind.drives, used, "d[do + ")
-    body.load(states, used, "x[xo + ")
+    body.load(kind.columns, used, "model.parameters", "own.parameters")
+    body.load(kind.drives, used, "data.drives", "own.drive")
+    body.load(states, used, "internal", "own.state")
     if tangent:
-        body.load_tangents(kind.drives, used, "d_t[do + ")
-        body.load_tangents(states, used, "x_t[xo + ")
+        body.load_tangents(kind.drives, used, "data.drives_t", "own.drive")
+        body.load_tangents(states, used, "data.internal_t", "own.state")
         body.active |= {"fibre_length"} | (set() if kind.steady_activation else {"activation"})
     body.compute(stage)
     count = len(kind.kept)
+    body.add("scratch = data.scratch")
     for i, name in enumerate(kind.kept):
-        body.add(f"w[wo + {i}] = {name}")
+        body.add(f"scratch[own.scratch + {i}] = {name}")
         if tangent:
-            body.add(f"w[wo + {count + i}] = {body.slope(name)}")
+            body.add(f"scratch[own.scratch + {count + i}] = {body.slope(name)}")
     body.add("return 0")
-    if tangent:
-        arguments = "fibre_length, d_fibre_length, activation, d_activation, p, o, x, x_t, xo, d, d_t, do, w, wo"
-        return body.function(f"unit{number}_before_t", arguments)
-    return body.function(f"unit{number}_before", "fibre_length, activation, p, o, x, xo, d, do, w, wo")
+    return body.function("unit_before_t" if tangent else "unit_before", number)
 
 
 def force_inputs(kind: UnitKind) -> dict[str, str]:
-    """What a unit's force needs beside the fibre velocity, and where it stands in p and w."""
+    """What a unit's force needs beside the fibre velocity, and where it stands for the group {own}."""
     used = used_by(upstream(kind.stages["loop"], {"fibre_force"})) | {"fibre_force"}
-    places = {name: f"p[{{o}} + {i}]" for i, name in enumerate(kind.columns)}
-    places |= {name: f"w[{{wo}} + {i}]" for i, name in enumerate(kind.kept)}
+    places = {name: f"model.parameters[{{own}}.parameters + {i}]" for i, name in enumerate(kind.columns)}
+    places |= {name: f"data.scratch[{{own}}.scratch + {i}]" for i, name in enumerate(kind.kept)}
     return {name: place for name, place in places.items() if name in used}
 
 
-def unit_force(equations: Equations, number: int, kind: UnitKind) -> list[str]:
-    """Force and its slope in the fibre velocity: from numbers, which stay in registers, and from arrays."""
+def unit_force_of(equations: Equations, number: int, kind: UnitKind) -> str:
+    """Force and its slope in the fibre velocity from numbers, which stay in registers."""
     body = Body(equations, {"fibre_velocity"})
     body.compute(upstream(kind.stages["loop"], {"fibre_force"}))
     body.add(f"return fibre_force, {body.slope('fibre_force')}")
-    places = force_inputs(kind)
-    given = ", ".join(["fibre_velocity", "d_fibre_velocity", *places])
-    arrays = Body(equations)
-    found = (place.format(o="o", wo="wo") for place in places.values())
-    arrays.add(f"return unit{number}_force_of({', '.join(['fibre_velocity', 'd_fibre_velocity', *found])})")
-    return [
-        body.function(f"unit{number}_force_of", given),
-        arrays.function(f"unit{number}_force", "fibre_velocity, d_fibre_velocity, p, o, w, wo"),
-    ]
+    return body.text(f"unit{number}_force_of", ", ".join(["fibre_velocity", "d_fibre_velocity", *force_inputs(kind)]))
 
 
-def unit_loop(
-    equations: Equations,
-    number: int,
-    kind: UnitKind,
-    outputs: list[str],
-    name: str,
-    tangent: bool,
-) -> str:
-    """Loop stage, for the force or the rates, from arrays."""
+def unit_force(equations: Equations, number: int, kind: UnitKind) -> str:
+    """The same from the arrays."""
     body = Body(equations)
-    stage = upstream(kind.stages["loop"], set(outputs))
-    used = used_by(stage) | set(outputs)
-    body.load(kind.columns, used, "p[o + ")
-    body.load(kind.kept, used, "w[wo + ")
+    given = [place.format(own="own") for place in force_inputs(kind).values()]
+    body.add(f"return unit{number}_force_of({', '.join(['fibre_velocity', 'd_fibre_velocity', *given])})")
+    return body.function("unit_force", number)
+
+
+def loop_stage(equations: Equations, kind: UnitKind, outputs: set[str], tangent: bool) -> Body:
+    """The equations of the loop stage that some outputs need, with what they need from the arrays."""
+    body = Body(equations)
+    stage = upstream(kind.stages["loop"], outputs)
+    used = used_by(stage) | outputs
+    body.load(kind.columns, used, "model.parameters", "own.parameters")
+    body.load(kind.kept, used, "data.scratch", "own.scratch")
     if tangent:
-        count = len(kind.kept)
-        body.load_tangents([""] * count + kind.kept, used, "w[wo + ")
-    if tangent:
+        body.load_tangents(kind.kept, used, "data.scratch", f"own.scratch + {len(kind.kept)}")
         body.active.add("fibre_velocity")
     body.compute(stage)
-    if name == "force":
-        body.add(f"return fibre_force, {body.slope('fibre_force')}")
-        return body.function(f"unit{number}_force_t", "fibre_velocity, d_fibre_velocity, p, o, w, wo")
-    for i, rate in enumerate(outputs):
-        body.add(f"dx[xo + {i}] = {rate}")
+    return body
+
+
+def unit_force_t(equations: Equations, number: int, kind: UnitKind) -> str:
+    """Force and its tangent, that of lengths, states and drives included."""
+    body = loop_stage(equations, kind, {"fibre_force"}, tangent=True)
+    body.add(f"return fibre_force, {body.slope('fibre_force')}")
+    return body.function("unit_force_t", number)
+
+
+def unit_rates(equations: Equations, number: int, kind: UnitKind, rates: list[str], tangent: bool) -> str:
+    """Rates of the unit's states; the tangents go, as the rates that belong to them, into `data`."""
+    body = loop_stage(equations, kind, set(rates), tangent)
+    target = "data.rates" if tangent else "rates"
+    for i, rate in enumerate(rates):
+        body.add(f"{target}[own.state + {i}] = {rate}")
         if tangent:
-            body.add(f"dx_t[xo + {i}] = {body.slope(rate)}")
+            body.add(f"data.rates_t[own.state + {i}] = {body.slope(rate)}")
     body.add("return 0")
-    if tangent:
-        return body.function(
-            f"unit{number}_rates_t",
-            "fibre_velocity, d_fibre_velocity, p, o, w, wo, dx, dx_t, xo",
-        )
-    return body.function(f"unit{number}_rates", "fibre_velocity, p, o, w, wo, dx, xo")
+    return body.function("unit_rates_t" if tangent else "unit_rates", number)
 
 
 def unit_observe(equations: Equations, number: int, kind: UnitKind, states: list[str]) -> str:
@@ -243,144 +290,97 @@ def unit_observe(equations: Equations, number: int, kind: UnitKind, states: list
     body = Body(equations)
     stages = [kind.stages[stage] for stage in ("drive", "before", "loop")]
     used = used_by(*stages)
-    body.load(kind.columns, used, "p[o + ")
-    body.load(states, used, "x[xo + ")
+    body.load(kind.columns, used, "model.parameters", "own.parameters")
+    body.load(states, used, "internal", "group.state")
     for stage in stages:
         body.compute(stage)
     body.add("passive_force = passive_force_factor * maximum_passive_force")
-    body.add(*(f"out[oo + {i}] = {name}" for i, name in enumerate(UNIT_OUTPUTS)))
+    body.add(*(f"out[{i}] = {name}" for i, name in enumerate(UNIT_OUTPUTS)))
     body.add("return 0")
-    return body.function(f"unit{number}_observe", "fibre_length, fibre_velocity, activation, p, o, x, xo, out, oo")
+    return body.function("unit_observe", number)
 
 
-def dispatch(name: str, count: int, call: str, indent: str) -> list[str]:
-    """Lines that call function `name` of the kind in variable `kind`; {n} is its number."""
-    lines = []
-    for number in range(count):
-        head = "if" if number == 0 else "elif"
-        if count > 1:
-            lines.append(f"{indent}{head} kind == {number}:")
-            lines.append(f"{indent}    {call.format(name=name.format(n=number))}")
-        else:
-            lines.append(f"{indent}{call.format(name=name.format(n=number))}")
-    return lines
+def by_kind(record: str, lines: dict[int, list[str]], indent: str, kinds: int) -> list[str]:
+    """Lines for each kind, chosen by the kind of a record. kinds: how many there are."""
+    if kinds == 1:
+        return [indent + line for own in lines.values() for line in own]
+    chosen = []
+    for place, (number, own) in enumerate(lines.items()):
+        chosen.append(f"{indent}{'elif' if place else 'if'} {record}.kind == {number}:")
+        chosen += [f"{indent}    {line}" for line in own]
+    return chosen
 
 
-def group_loops(layout: Layout) -> list[str]:
-    """Functions that run over the groups of a muscle."""
-    kinds = layout.unit_kinds
-    groups = layout.muscles * len(MUSCLE_INDEX)
-    head = [
-        "    for g in range(first, last):",
-        f"        r = {groups} + g * {len(GROUP_INDEX)}",
-        "        kind, o, xo, do, wo = k[r], k[r + 1], k[r + 2], k[r + 3], k[r + 4]",
-    ]
-    texts = []
-    for suffix, given, call in (
-        (
-            "",
-            "fibre_length, activation, first, last, p, k, x, d, w",
-            "{name}(fibre_length, activation, p, o, x, xo, d, do, w, wo)",
-        ),
-        (
-            "_t",
-            "fibre_length, d_fibre_length, activation, d_activation, first, last, p, k, x, x_t, d, d_t, w",
-            "{name}(fibre_length, d_fibre_length, activation, d_activation, p, o, x, x_t, xo, d, d_t, do, w, wo)",
-        ),
-    ):
-        lines = dispatch(f"unit{{n}}_before{suffix}", len(kinds), call, " " * 8)
-        texts.append("\n".join([f"{INLINE}def units_before{suffix}({given}):", *head, *lines, "    return 0"]))
-        lines = dispatch(
-            f"unit{{n}}_force{suffix}",
-            len(kinds),
-            "force, slope = {name}(fibre_velocity, d_fibre_velocity, p, o, w, wo)",
-            " " * 8,
-        )
-        texts.append(
-            "\n".join(
-                [
-                    f"{INLINE}def units_force{suffix}(fibre_velocity, d_fibre_velocity, first, last, p, k, w):",
-                    "    total = 0.0",
-                    "    total_slope = 0.0",
-                    "    force = 0.0",
-                    "    slope = 0.0",
-                    *head,
-                    *lines,
-                    "        total += force",
-                    "        total_slope += slope",
-                    "    return total, total_slope",
-                ]
-            )
-        )
-    for suffix, given, arguments in (
-        ("", "fibre_velocity, first, last, p, k, w, dx", "fibre_velocity, p, o, w, wo, dx, xo"),
-        (
-            "_t",
-            "fibre_velocity, d_fibre_velocity, first, last, p, k, w, dx, dx_t",
-            "fibre_velocity, d_fibre_velocity, p, o, w, wo, dx, dx_t, xo",
-        ),
-    ):
-        lines = []
-        for number, kind in enumerate(kinds):
-            if kind.system.states:
-                lines += [
-                    f"        if kind == {number}:",
-                    f"            unit{number}_rates{suffix}({arguments})",
-                ]
-        body = [*head, *lines] if lines else []
-        texts.append("\n".join([f"{INLINE}def units_rates{suffix}({given}):", *body, "    return 0"]))
-    return [text + "\n" for text in texts]
+def loop(name: str, kinds: dict[int, UnitKind], count: int, total: bool = False) -> str:
+    """A function that runs the functions `name` of these kinds, of `count` in all, over the groups of a muscle.
+
+    total: whether they return a force and its slope, which are summed.
+    """
+    start = ["    total, total_slope, force, slope = 0.0, 0.0, 0.0, 0.0"] if total else []
+    each = "force, slope = {}" if total else "{}"
+    calls = {number: [each.format(call(name, number, own="group"))] for number in kinds}
+    lines = by_kind("group", calls, " " * 8, count)
+    sums = ["        total += force", "        total_slope += slope"] if total else []
+    return "\n".join(
+        [
+            f"@inline\ndef {name.replace('unit', 'units', 1)}({ARGUMENTS[name]}):",
+            *start,
+            "    for g in range(own.group, own.group_end):",
+            "        group = model.groups[g]",
+            *lines,
+            *sums,
+            f"    return {'total, total_slope' if total else '0'}\n",
+        ]
+    )
 
 
-MUSCLE_HEAD = "o, xo, do, first, last, wo = k[i + 2], k[i + 3], k[i + 4], k[i + 5], k[i + 6], k[i + 7]"
+def group_loops(units: Sequence[UnitKind], looped: bool) -> list[str]:
+    """Functions that run over the groups of a muscle. looped: whether groups of a muscle are not written out."""
+    kinds, count = dict(enumerate(units)), len(units)
+    moving = {number: kind for number, kind in kinds.items() if kind.system.states}
+    texts = [loop("unit_before", kinds, count), loop("unit_before_t", kinds, count)]
+    if looped:
+        texts.append(loop("unit_force", kinds, count, total=True))
+    texts.append(loop("unit_force_t", kinds, count, total=True))
+    if moving:
+        texts += [loop("unit_rates", moving, count), loop("unit_rates_t", moving, count)]
+    return texts
 
 
 def muscle_functions(equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind]) -> list[str]:
     """Functions of one kind of muscle. units: all kinds of motor units."""
     return [
         muscle_drive(equations, number, kind),
-        muscle_primal(equations, number, kind, units, observe=False),
-        muscle_primal(equations, number, kind, units, observe=True),
-        muscle_tangent(equations, number, kind),
+        muscle_primal(equations, number, kind, units),
+        muscle_observe(equations, number, kind, units),
+        muscle_tangent(equations, number, kind, units),
     ]
 
 
 def muscle_drive(equations: Equations, number: int, kind: MuscleKind) -> str:
-    """Drive stage: writes the muscle's drives, returns the activation where it is steady."""
+    """Drive stage: writes the muscle's drives, returns the activation if it is steady."""
     body = Body(equations)
     stage = kind.stages["drive"]
-    body.load(kind.columns, used_by(stage), "p[o + ")
+    body.load(kind.columns, used_by(stage), "model.parameters", "own.parameters")
     body.compute(stage)
-    body.add(*(f"out[do + {i}] = {name}" for i, name in enumerate(kind.drives)))
+    body.add(*(f"out[own.drive + {i}] = {name}" for i, name in enumerate(kind.drives)))
     body.add(f"return {'activation' if kind.steady_activation else 'excitation'}")
-    return body.function(f"muscle{number}_drive", "excitation, p, o, do, out")
+    return body.function("muscle_drive", number)
 
 
-def load_muscle(body: Body, kind: MuscleKind, extra: set[str]) -> list[str]:
-    """Read a muscle's numbers, drives and states; the names of the states."""
-    states = [state.name for state, _ in kind.system.states]
-    used = used_by(*(kind.stages[stage] for stage in ("before", "loop", "after"))) | extra
-    used |= {"activation"}
-    body.add(MUSCLE_HEAD)
-    body.load(kind.columns, used, "p[o + ")
-    body.load(kind.drives, used, "d[do + ")
-    body.load(states, used, "x[xo + ")
-    return states
+def load_muscle(body: Body, kind: MuscleKind, extra: set[str]) -> set[str]:
+    """Read a muscle's numbers, drives and states; the names of all that is used."""
+    used = used_by(*(kind.stages[stage] for stage in ("before", "loop", "after"))) | extra | {"activation"}
+    body.load(kind.columns, used, "model.parameters", "own.parameters")
+    body.load(kind.drives, used, "data.drives", "own.drive")
+    body.load([state.name for state, _ in kind.system.states], used, "internal", "own.state")
+    return used
 
 
-def muscle_primal(equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind], observe: bool) -> str:
-    """Torque, and the rates of the states; with `observe` also all outputs."""
-    body = Body(equations)
-    extra = set(MUSCLE_OUTPUTS) if observe else set()
-    states = load_muscle(body, kind, extra)
-    if kind.steady_activation:
-        body.add("activation = 0.0" if not observe else "activation = excitation")
-        if observe:
-            steady = kind.stages["drive"]
-            body.load(kind.columns, used_by(steady), "p[o + ")
-            body.compute(steady)
+def solve_muscle(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
+    """From the activation to the torque and the rates of the states."""
     body.compute(kind.stages["before"])
-    body.add("units_before(fibre_length, activation, first, last, p, k, x, d, w)")
+    body.add(call_loop("unit_before"))
     gather(body, kind, units)
     if kind.closes_loop:
         newton(body, kind, units)
@@ -388,36 +388,55 @@ def muscle_primal(equations: Equations, number: int, kind: MuscleKind, units: Se
         body.add(*force_lines(kind, units, "0.0"), "total_fibre_force = total")
     body.compute(kind.stages["loop"])
     body.compute(kind.stages["after"])
-    body.add("w[wo] = total_fibre_force", "w[wo + 1] = slope")
+    body.add("data.scratch[own.scratch] = total_fibre_force", "data.scratch[own.scratch + 1] = slope")
     for i, (state, _) in enumerate(kind.system.states):
-        body.add(f"dx[xo + {i}] = {state.rate}")
-    body.add("units_rates(fibre_velocity, first, last, p, k, w, dx)")
-    if observe:
-        defined = {bound.defines for bound in kind.system.equations} | set(states)
-        defined |= {"total_fibre_force"}
-        for i, name in enumerate(MUSCLE_OUTPUTS):
-            body.add(f"out[oo + {i}] = {name if name in defined else '0.0'}")
-        body.add("return muscle_torque")
-        return body.function(
-            f"muscle{number}_observe",
-            "i, joint_angle, joint_velocity, excitation, p, k, x, d, w, dx, out, oo",
-        )
+        body.add(f"rates[own.state + {i}] = {state.rate}")
+    if any(unit.system.states for unit in units):
+        body.add(call_loop("unit_rates"))
+
+
+def muscle_primal(equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind]) -> str:
+    """Torque, and the rates of the states."""
+    body = Body(equations)
+    load_muscle(body, kind, set())
+    if kind.steady_activation:
+        body.add("activation = 0.0")
+    solve_muscle(body, kind, units)
     body.add("return muscle_torque")
-    return body.function(f"muscle{number}", "i, joint_angle, joint_velocity, p, k, x, d, w, dx")
+    return body.function("muscle", number)
+
+
+def muscle_observe(equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind]) -> str:
+    """Everything that a muscle shows."""
+    body = Body(equations)
+    load_muscle(body, kind, set(MUSCLE_OUTPUTS))
+    if kind.steady_activation:
+        body.add("activation = excitation")
+        steady = kind.stages["drive"]
+        body.load(kind.columns, used_by(steady), "model.parameters", "own.parameters")
+        body.compute(steady)
+    body.add("rates = data.rates")
+    solve_muscle(body, kind, units)
+    defined = {bound.defines for bound in kind.system.equations} | {state.name for state, _ in kind.system.states}
+    defined |= {"total_fibre_force"}
+    for i, name in enumerate(MUSCLE_OUTPUTS):
+        body.add(f"out[{i}] = {name if name in defined else '0.0'}")
+    body.add("return 0")
+    return body.function("muscle_observe", number)
 
 
 def gather(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
     """Read what the forces of the muscle's groups need from arrays, once."""
     for group, number in enumerate(kind.groups):
-        body.add(f"r = GROUPS + (first + {group}) * GROUP_RECORD", "o_group, wo_group = k[r + 1], k[r + 4]")
+        body.add(f"group{group} = model.groups[own.group + {group}]")
         for name, place in force_inputs(units[number]).items():
-            body.add(f"{name}_{group} = {place.format(o='o_group', wo='wo_group')}")
+            body.add(f"{name}_{group} = {place.format(own=f'group{group}')}")
 
 
 def force_lines(kind: MuscleKind, units: Sequence[UnitKind], velocity_slope: str) -> list[str]:
     """Lines that set `total` and its `slope`: the force of all groups, those few by their gathered numbers."""
     if not kind.groups:
-        return [f"total, slope = units_force(fibre_velocity, {velocity_slope}, first, last, p, k, w)"]
+        return [f"total, slope = {call_loop('unit_force', d_fibre_velocity=velocity_slope)}"]
     lines = []
     for group, number in enumerate(kind.groups):
         given = ", ".join(f"{name}_{group}" for name in force_inputs(units[number]))
@@ -436,7 +455,7 @@ def newton(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
     inner = Body(body.equations, {"total_fibre_force"})
     inner.compute(kind.stages["loop"])
     body.add(
-        "total_fibre_force = w[wo]",
+        "total_fibre_force = data.scratch[own.scratch]",
         "if not abs(total_fibre_force) < 1e300:",
         "    total_fibre_force = 0.0",
         "d_total_fibre_force = 1.0",
@@ -471,28 +490,24 @@ def newton(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
     )
 
 
-def muscle_tangent(equations: Equations, number: int, kind: MuscleKind) -> str:
-    """Derivative of torque and rates in a direction, at the force that `muscle` found."""
+def muscle_tangent(equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind]) -> str:
+    """Derivative of torque and rates in a direction, at the force that `muscle` has left in the scratch numbers."""
     body = Body(equations)
-    states = load_muscle(body, kind, set())
-    used = used_by(*(kind.stages[stage] for stage in ("before", "loop", "after"))) | {"activation"}
-    body.load_tangents(kind.drives, used, "d_t[do + ")
-    body.load_tangents(states, used, "x_t[xo + ")
+    used = load_muscle(body, kind, set())
+    body.load_tangents(kind.drives, used, "data.drives_t", "own.drive")
+    body.load_tangents([state.name for state, _ in kind.system.states], used, "data.internal_t", "own.state")
     body.active |= {"joint_angle", "joint_velocity"}
     if kind.steady_activation:
         body.add("activation = 0.0")
     body.compute(kind.stages["before"])
-    body.add(
-        f"units_before_t(fibre_length, {body.slope('fibre_length')}, activation, "
-        f"{body.slope('activation')}, first, last, p, k, x, x_t, d, d_t, w)"
-    )
-    body.add("total_fibre_force = w[wo]")
-    force = "_, d_total_fibre_force = units_force_t(fibre_velocity, d_fibre_velocity, first, last, p, k, w)"
+    tangents = {"d_fibre_length": body.slope("fibre_length"), "d_activation": body.slope("activation")}
+    body.add(call_loop("unit_before_t", **tangents), "total_fibre_force = data.scratch[own.scratch]")
+    force = f"_, d_total_fibre_force = {call_loop('unit_force_t')}"
     body.active.add("total_fibre_force")
     if kind.closes_loop:
         body.add("d_total_fibre_force = 0.0")
         body.compute(kind.stages["loop"])
-        body.add(force, "d_total_fibre_force = d_total_fibre_force / (1.0 - w[wo + 1])")
+        body.add(force, "d_total_fibre_force = d_total_fibre_force / (1.0 - data.scratch[own.scratch + 1])")
         body.compute(kind.stages["loop"])
     else:
         if "fibre_velocity" not in body.active:
@@ -501,91 +516,62 @@ def muscle_tangent(equations: Equations, number: int, kind: MuscleKind) -> str:
         body.compute(kind.stages["loop"])
     body.compute(kind.stages["after"])
     for i, (state, _) in enumerate(kind.system.states):
-        body.add(f"dx[xo + {i}] = {state.rate}")
-        body.add(f"dx_t[xo + {i}] = {body.slope(state.rate)}")
-    velocity_slope = body.slope("fibre_velocity")
-    body.add(
-        f"units_rates_t(fibre_velocity, {velocity_slope}, first, last, p, k, w, dx, dx_t)",
-        f"return muscle_torque, {body.slope('muscle_torque')}",
-    )
-    return body.function(
-        f"muscle{number}_t",
-        "i, joint_angle, d_joint_angle, joint_velocity, d_joint_velocity, p, k, x, x_t, d, d_t, w, dx, dx_t",
-    )
+        body.add(f"data.rates[own.state + {i}] = {state.rate}")
+        body.add(f"data.rates_t[own.state + {i}] = {body.slope(state.rate)}")
+    if any(unit.system.states for unit in units):
+        body.add(call_loop("unit_rates_t", d_fibre_velocity=body.slope("fibre_velocity")))
+    body.add(f"return muscle_torque, {body.slope('muscle_torque')}")
+    return body.function("muscle_t", number)
 
 
-def program(layout: Layout, entries: str) -> str:
+def dispatcher(name: str, kinds: int) -> str:
+    """A function that calls the function `name` of the kind of its first argument."""
+    result = {"muscle": "0.0", "muscle_drive": "0.0", "muscle_t": "0.0, 0.0"}.get(name, "0")
+    lines = by_kind("own", {number: [f"return {call(name, number)}"] for number in range(kinds)}, "    ", kinds)
+    return "\n".join([f"@forced\ndef {name}({ARGUMENTS[name]}):", *lines, f"    return {result}\n"])
+
+
+def record_text(kind: np.dtype[np.void]) -> str:
+    """The type of a record as text."""
+    fields = []
+    for name in kind.names or ():
+        field = kind[name]
+        base = record_text(field.base) if field.base.names else f'"{field.base.str}"'
+        fields.append(f'("{name}", {base}, {field.shape})')
+    return f"np.dtype([{', '.join(fields)}])"
+
+
+def program(layout: Layout, imports: str, entries: str) -> str:
     """The text of a limb's module.
 
-    entries: source of the entry points, which call what is generated here.
+    imports: of what the entry points need. entries: their source; they call what is generated here.
     """
     equations = Equations()
     texts: list[str] = []
+    looped = any(not kind.groups for kind in layout.muscle_kinds)
     for number, unit_kind in enumerate(layout.unit_kinds):
-        texts += unit_functions(equations, number, unit_kind)
+        texts += unit_functions(equations, number, unit_kind, looped)
     if layout.muscles:
-        texts += group_loops(layout)
+        texts += group_loops(layout.unit_kinds, looped)
     for number, muscle_kind in enumerate(layout.muscle_kinds):
         texts += muscle_functions(equations, number, muscle_kind, layout.unit_kinds)
-    texts.append(dispatchers(layout))
-    groups = layout.muscles * len(MUSCLE_INDEX)
-    constants = {
-        "N": layout.joints,
-        "M": layout.muscles,
-        "S": layout.states,
-        "D": layout.drives,
-        "W": layout.work,
-        "P": layout.parameters.size,
-        "K": layout.index.size,
-        "MUSCLE_RECORD": len(MUSCLE_INDEX),
-        "GROUPS": groups,
-        "GROUP_RECORD": len(GROUP_INDEX),
-        "UNITS": groups + layout.groups * len(GROUP_INDEX),
-        "UNIT_RECORD": len(UNIT_INDEX),
-        "UNIT_COUNT": layout.units,
-        "MUSCLE_OUTPUTS": len(MUSCLE_OUTPUTS),
-        "UNIT_OUTPUTS": len(UNIT_OUTPUTS),
+    for name in ("muscle", "muscle_t", "muscle_observe", "muscle_drive"):
+        texts.append(dispatcher(name, len(layout.muscle_kinds)))
+    for name in ("unit_drive", "unit_observe"):
+        texts.append(dispatcher(name, len(layout.unit_kinds)))
+    constants: dict[str, object] = {
+        "JOINTS": layout.joints,
+        "MUSCLES": layout.muscles,
+        "UNITS": layout.units,
+        "STATES": layout.states,
+        "DRIVES": layout.drives,
         "FIBRE_LENGTH": MUSCLE_OUTPUTS.index("fibre_length"),
         "FIBRE_VELOCITY": MUSCLE_OUTPUTS.index("fibre_velocity"),
         "ACTIVATION": MUSCLE_OUTPUTS.index("activation"),
-        "STEADY": 1 if all(kind.steady_activation for kind in layout.muscle_kinds) else 0,
+        **dict(sorted(equations.constants.items())),
     }
-    lines = [f"{name} = {value}" for name, value in constants.items()]
-    lines += [f"{name} = {value!r}" for name, value in sorted(equations.constants.items())]
-    head = "import math\n\nimport numpy as np\nfrom numba import carray, njit\n\n"
-    return head + "\n".join(lines) + "\n\n\n" + "\n\n".join([*equations.texts, *texts, entries])
-
-
-def dispatchers(layout: Layout) -> str:
-    """Functions that call the right kind of unit or muscle."""
-    muscles, units = len(layout.muscle_kinds), len(layout.unit_kinds)
-    parts = []
-    for name, target, count, given, back in (
-        ("muscle", "muscle{n}", muscles, "i, q, v, p, k, x, d, w, dx", "0.0"),
-        (
-            "muscle_t",
-            "muscle{n}_t",
-            muscles,
-            "i, q, d_q, v, d_v, p, k, x, x_t, d, d_t, w, dx, dx_t",
-            "0.0, 0.0",
-        ),
-        (
-            "muscle_observe",
-            "muscle{n}_observe",
-            muscles,
-            "i, q, v, excitation, p, k, x, d, w, dx, out, oo",
-            "0.0",
-        ),
-        ("muscle_drive", "muscle{n}_drive", muscles, "excitation, p, o, do, out", "0.0"),
-        ("unit_drive", "unit{n}_drive", units, "activation, p, o, group, do, out", "0"),
-        (
-            "unit_observe",
-            "unit{n}_observe",
-            units,
-            "length, velocity, activation, p, o, x, xo, out, oo",
-            "0",
-        ),
-    ):
-        lines = dispatch(target, count, "return {name}(" + given + ")", "    ")
-        parts.append("\n".join([f"{FORCED}def {name}(kind, {given}):", *lines, f"    return {back}"]) + "\n")
-    return "\n\n".join(parts)
+    lines = [f"{name} = {value!r}" for name, value in constants.items()]
+    lines += [f"MODEL = {record_text(layout.model.dtype)}", f"DATA = {record_text(data_type(layout))}"]
+    lines.append("ARGUMENTS = arguments_of(from_dtype(MODEL), from_dtype(DATA))")
+    head = "\n".join([PRELUDE, imports, DECORATORS, *lines])
+    return head + "\n\n\n" + "\n\n".join([*equations.texts, *texts, entries])

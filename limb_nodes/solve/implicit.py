@@ -1,27 +1,89 @@
-"""One step of RODAS, a stiffly accurate Rosenbrock method of order 4(3), compiled.
+"""Stiffly accurate Rosenbrock methods, compiled.
 
-Coefficients and interpolant: Hairer and Wanner, Solving Ordinary Differential Equations II, IV.7
-and IV.10. It is L-stable: fast decaying motion does not limit the step.
+Hairer and Wanner, Solving Ordinary Differential Equations II, IV.7: increments u with
+(I / (h gamma) - slopes) u_i = f(t + nodes_i h, y + sum of stages_ij u_j) + sum of couplings_ij u_j / h
++ times_i h df/dt. An L-stable one lets fast decaying motion not limit the step.
 """
 
 from __future__ import annotations
 
-import math
+from typing import Any, NamedTuple
 
+import numpy as np
 from numba import carray
 
 from limb_nodes.solve.inner import inner
-from limb_nodes.solve.method import BETWEEN, ERROR, STEP, Method
-from limb_nodes.solve.pointer import call, callback
+from limb_nodes.solve.method import BETWEEN, STEP, Method, judge
+from limb_nodes.solve.pointer import callback, numbers_at
+from limb_nodes.solve.problem import evaluate, work_of, work_rows
+
+
+class Rosenbrock(NamedTuple):
+    """The tableau of a method of s stages, whose last increment is the estimated error.
+
+    stages: [s, s], the state of each stage, below the diagonal; the step adds one last increment to that
+    of the last stage. couplings: [s, s], between the increments, below the diagonal; the diagonal
+    holds 1 / gamma. nodes: [s], time of each stage as a part of the step. times: [s], weights of the
+    slope in time. bend, twist: [s], weights of the increments in the continuous extension.
+    """
+
+    stages: Any
+    couplings: Any
+    nodes: Any
+    times: Any
+    bend: Any
+    twist: Any
+
+
+# RODAS, order 4(3), L-stable: IV.10 and its code.
+RODAS = Rosenbrock(
+    stages=np.array(
+        [
+            [0, 0, 0, 0, 0, 0],
+            [1.544, 0, 0, 0, 0, 0],
+            [0.9466785280815826, 0.2557011698983284, 0, 0, 0, 0],
+            [3.314825187068521, 2.896124015972201, 0.9986419139977817, 0, 0, 0],
+            [1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 0, 0],
+            [1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950, 1, 0],
+        ]
+    ),
+    couplings=np.array(
+        [
+            [4, 0, 0, 0, 0, 0],
+            [-5.6688, 4, 0, 0, 0, 0],
+            [-2.430093356833875, -0.2063599157091915, 4, 0, 0, 0],
+            [-0.1073529058151375, -9.594562251023355, -20.47028614809616, 4, 0, 0],
+            [7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160, 4, 0],
+            [8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054, 4],
+        ]
+    ),
+    nodes=np.array([0, 0.386, 0.21, 0.63, 1, 1]),
+    times=np.array([0.25, -0.1043, 0.1035, -0.03620000000000023, 0, 0]),
+    bend=np.array(
+        [10.12623508344586, -7.487995877610167, -34.80091861555747, -7.992771707568823, 1.025137723295662, 0]
+    ),
+    twist=np.array(
+        [-0.6762803392801253, 6.087714651680015, 16.43084320892478, 24.76722511418386, -6.594389125716872, 0]
+    ),
+)
 
 
 @inner
-def factor(n, h, slopes, matrix, pivots):
-    """LU factors of I / (h gamma) - slopes, with partial pivoting."""
+def tableau_of(method):
+    """The tableau of a method."""
+    s = method.stages
+    rows = carray(numbers_at(method.tableau), (2 * s + 4, s))
+    return Rosenbrock(rows[:s], rows[s : 2 * s], rows[2 * s], rows[2 * s + 1], rows[2 * s + 2], rows[2 * s + 3])
+
+
+@inner
+def factor(diagonal, slopes, matrix, pivots):
+    """LU factors of (diagonal I - slopes), with partial pivoting; slopes as the problem's jacobian gives them."""
+    n = pivots.size
     for i in range(n):
         for j in range(n):
-            matrix[i, j] = -slopes[i * n + j]
-        matrix[i, i] += 4.0 / h
+            matrix[i, j] = -slopes[j, i]
+        matrix[i, i] += diagonal
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -39,10 +101,11 @@ def factor(n, h, slopes, matrix, pivots):
 
 
 @inner
-def solve(n, matrix, pivots, right):
+def solve(matrix, pivots, right):
     """Solve with the factors, in place."""
+    n = right.size
     for k in range(n):
-        other = pivots[k]
+        other = int(pivots[k])
         if other != k:
             right[k], right[other] = right[other], right[k]
     for i in range(n):
@@ -55,111 +118,52 @@ def solve(n, matrix, pivots, right):
 
 
 @callback(*STEP)
-def step(rates, t, h, n, rows, y_, start_rates_, slopes_, stages_, p_, k_, u_, c_, stage_y_, new_y_, matrix_, pivots_):
-    """One step of size h; stages [6] holds the increments, the last of them the estimated error.
-
-    start_rates: at t. slopes: what the program's `jacobian` gives at t.
-    """
-    y, start_rates, s = carray(y_, (n,)), carray(start_rates_, (n,)), carray(stages_, (7, n))
-    stage_y, new_y = carray(stage_y_, (n,)), carray(new_y_, (n,))
-    p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
-    slopes, matrix, pivots = carray(slopes_, (n * n + n,)), carray(matrix_, (n, n)), carray(pivots_, (n,))
-    factor(n, h, slopes, matrix, pivots)
-    by_time = slopes[n * n :]
+def step(t, h, method_, work_, control_, problem_):
+    """One step of size h; the stages hold the increments, the last of them the estimated error."""
+    method, control, problem = carray(method_, 1)[0], carray(control_, 1)[0], carray(problem_, 1)[0]
+    n, tableau = problem.states, tableau_of(method)
+    work = work_of(carray(work_, (work_rows(problem, method), n)), problem, method)
+    in_time, increments, state = work.slopes[n], work.stages, work.stage_state
+    factor(tableau.couplings[0, 0] / h, work.slopes, work.matrix, work.pivots)
+    for stage in range(method.stages):
+        own, couplings = increments[stage], tableau.couplings[stage]
+        if stage == 0:
+            for i in range(n):
+                own[i] = work.start_rates[i]
+        else:
+            for i in range(n):
+                state[i] = work.state[i]
+                for j in range(stage):
+                    state[i] += tableau.stages[stage, j] * increments[j, i]
+            evaluate(problem.rates, t + tableau.nodes[stage] * h, state, problem, own)
+        for i in range(n):
+            total = 0.0
+            for j in range(stage):
+                total += couplings[j] * increments[j, i]
+            own[i] += total / h + tableau.times[stage] * h * in_time[i]
+        solve(work.matrix, work.pivots, own)
     for i in range(n):
-        s[0, i] = start_rates[i] + 0.25 * h * by_time[i]
-    solve(n, matrix, pivots, s[0])
-    for i in range(n):
-        stage_y[i] = y[i] + 1.544 * s[0, i]
-    call(rates, t + 0.386 * h, stage_y, p, k, u, c, s[1])
-    for i in range(n):
-        s[1, i] += -5.6688 / h * s[0, i] - 0.1043 * h * by_time[i]
-    solve(n, matrix, pivots, s[1])
-    for i in range(n):
-        stage_y[i] = y[i] + 0.9466785280815826 * s[0, i] + 0.2557011698983284 * s[1, i]
-    call(rates, t + 0.21 * h, stage_y, p, k, u, c, s[2])
-    for i in range(n):
-        s[2, i] += (-2.430093356833875 * s[0, i] - 0.2063599157091915 * s[1, i]) / h + 0.1035 * h * by_time[i]
-    solve(n, matrix, pivots, s[2])
-    for i in range(n):
-        stage_y[i] = y[i] + 3.314825187068521 * s[0, i] + 2.896124015972201 * s[1, i] + 0.9986419139977817 * s[2, i]
-    call(rates, t + 0.63 * h, stage_y, p, k, u, c, s[3])
-    for i in range(n):
-        s[3, i] += (-0.1073529058151375 * s[0, i] - 9.594562251023355 * s[1, i] - 20.47028614809616 * s[2, i]) / h
-        s[3, i] -= 0.03620000000000023 * h * by_time[i]
-    solve(n, matrix, pivots, s[3])
-    for i in range(n):
-        stage_y[i] = (
-            y[i]
-            + 1.221224509226641 * s[0, i]
-            + 6.019134481288629 * s[1, i]
-            + 12.53708332932087 * s[2, i]
-            - 0.6878860361058950 * s[3, i]
-        )
-    call(rates, t + h, stage_y, p, k, u, c, s[4])
-    for i in range(n):
-        s[4, i] += (
-            7.496443313967647 * s[0, i]
-            - 10.24680431464352 * s[1, i]
-            - 33.99990352819905 * s[2, i]
-            + 11.70890893206160 * s[3, i]
-        ) / h
-    solve(n, matrix, pivots, s[4])
-    for i in range(n):
-        stage_y[i] += s[4, i]
-    call(rates, t + h, stage_y, p, k, u, c, s[5])
-    for i in range(n):
-        s[5, i] += (
-            8.083246795921522 * s[0, i]
-            - 7.981132988064893 * s[1, i]
-            - 31.52159432874371 * s[2, i]
-            + 16.31930543123136 * s[3, i]
-            - 6.058818238834054 * s[4, i]
-        ) / h
-    solve(n, matrix, pivots, s[5])
-    for i in range(n):
-        new_y[i] = stage_y[i] + s[5, i]
-
-
-@callback(*ERROR)
-def error_norm(h, tolerance, n, y_, new_y_, stages_, scale_, found):
-    """Largest estimated error over its tolerance."""
-    y, new_y, stages, scale = carray(y_, (n,)), carray(new_y_, (n,)), carray(stages_, (7, n)), carray(scale_, (n,))
-    worst = 0.0
-    for i in range(n):
-        ratio = abs(stages[5, i]) / (tolerance * max(scale[i], abs(y[i]), abs(new_y[i])))
-        if not ratio <= worst:
-            worst = ratio
-        if not math.isfinite(worst):
-            break
-    found[0] = worst
+        work.new_state[i] = state[i] + own[i]
+    judge(own, work, control)
 
 
 @callback(*BETWEEN)
-def interpolate(t, h, n, count, times_, y_, new_y_, stages_, out_):
+def between(t, h, count, times_, out_, method_, work_, problem_):
     """States at times from t to t + h, of third order."""
-    y, new_y, stages = carray(y_, (n,)), carray(new_y_, (n,)), carray(stages_, (7, n))
+    method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
+    n, tableau = problem.states, tableau_of(method)
+    work = work_of(carray(work_, (work_rows(problem, method), n)), problem, method)
     times, out = carray(times_, (count,)), carray(out_, (count, n))
     for i in range(n):
-        bend = (
-            10.12623508344586 * stages[0, i]
-            - 7.487995877610167 * stages[1, i]
-            - 34.80091861555747 * stages[2, i]
-            - 7.992771707568823 * stages[3, i]
-            + 1.025137723295662 * stages[4, i]
-        )
-        twist = (
-            -0.6762803392801253 * stages[0, i]
-            + 6.087714651680015 * stages[1, i]
-            + 16.43084320892478 * stages[2, i]
-            + 24.76722511418386 * stages[3, i]
-            - 6.594389125716872 * stages[4, i]
-        )
+        bend = twist = 0.0
+        for stage in range(method.stages):
+            bend += tableau.bend[stage] * work.stages[stage, i]
+            twist += tableau.twist[stage] * work.stages[stage, i]
         for row in range(count):
             part = min(1.0, (times[row] - t) / h)
             rest = 1.0 - part
             # Written so that what rests stays exactly where it is.
-            out[row, i] = y[i] + part * (new_y[i] - y[i] + rest * (bend + part * twist))
+            out[row, i] = work.state[i] + part * (work.new_state[i] - work.state[i] + rest * (bend + part * twist))
 
 
-IMPLICIT = Method(step, error_norm, interpolate)
+IMPLICIT = Method(step, between, np.vstack(RODAS), len(RODAS.nodes), implicit=True)

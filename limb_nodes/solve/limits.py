@@ -2,22 +2,26 @@
 
 Called by address, as a method is, so that limbs without limits need not wait for their compilation.
 
-limits: lowest angles, then highest [2 joints]; they stand in the parameters p at limit_offset. locked: per joint
-1 or -1 while it rests on its highest or lowest; in the context c at locked_offset.
+limits: lowest angles, then highest [2 joints]. locked: per joint 1 or -1 while it rests on its highest or lowest.
 """
 
 from __future__ import annotations
 
 import math
-from functools import cache
 
-import numpy as np
 from numba import carray
 
-from limb_nodes.foundation.arrays import IntArray
 from limb_nodes.solve.inner import inner
-from limb_nodes.solve.method import STEP, take_step
-from limb_nodes.solve.pointer import call, callback, f8, i8, numbers, whole_numbers
+from limb_nodes.solve.pointer import callback, f8, numbers, numbers_at
+from limb_nodes.solve.problem import (
+    control_pointer,
+    evaluate,
+    method_pointer,
+    problem_pointer,
+    take_step,
+    work_of,
+    work_rows,
+)
 
 # What happens at the end of a step.
 NOTHING, IMPACT, RELEASE = 0, 1, 2
@@ -26,7 +30,7 @@ NOTHING, IMPACT, RELEASE = 0, 1, 2
 TOUCH = 1e-12
 # A joint that meets its limit is brought so near to it (rad).
 ON_LIMIT = 1e-13
-# A joint leaves its limit where the pull has fallen to this part of that at the step's end.
+# A joint leaves its limit when the pull has fallen to this part of that at the step's end.
 JUST = 1e-11
 # After a release the joint is left alone for this long (s), so that rounding cannot catch it again.
 LEAST_FLIGHT = 1e-9
@@ -34,7 +38,7 @@ LEAST_FLIGHT = 1e-9
 
 @inner
 def overshoot(new_y, limits, joints, locked):
-    """The free joint farthest beyond its limit and how far (rad, negative where none is)."""
+    """The free joint farthest beyond its limit and how far (rad, negative if none is)."""
     joint, worst = -1, -math.inf
     for j in range(joints):
         if locked[j] == 0.0:
@@ -57,10 +61,10 @@ def any_locked(locked):
 def turning_point(y, new_y, limits, joints, locked, h):
     """Part of a step after which a free joint turns back so near its limit that it may have crossed it.
 
-    The largest such part, 0.0 where there is none: by its velocity a joint that turns within the
+    The largest such part, 0.0 if there is none: by its velocity a joint that turns within the
     step has gone at most a quarter of the step beyond both its ends.
     """
-    found = 0.0
+    largest = 0.0
     for j in range(joints):
         if locked[j] != 0.0:
             continue
@@ -72,13 +76,13 @@ def turning_point(y, new_y, limits, joints, locked, h):
         else:
             continue
         if room < 0.25 * h * max(abs(before), abs(after)):
-            found = max(found, before / (before - after))
-    return found
+            largest = max(largest, before / (before - after))
+    return largest
 
 
 @inner
 def pulled_back(reaction, joints, locked):
-    """The joint on a limit that is pulled off it most strongly, and the pull (N m, negative where none is)."""
+    """The joint on a limit that is pulled off it most strongly, and the pull (N m, negative if none is)."""
     joint, worst = -1, -math.inf
     for j in range(joints):
         if locked[j] != 0.0 and locked[j] * reaction[j] > worst:
@@ -87,14 +91,13 @@ def pulled_back(reaction, joints, locked):
 
 
 @inner
-def pull_behind(rates, reactions, stiff, t, arrays, joints, locked):
+def pull_behind(t, method, work, problem, locked):
     """`pulled_back` at the end t of a step."""
-    _, _, _, _, p, k, u, c, stage_y, new_y, _, _ = arrays
-    if stiff != 0:
+    if method.implicit:
         # The explicit step ends with the rates there, which leave the torques that `reactions` takes.
-        call(rates, t, new_y, p, k, u, c, stage_y)
-    call(reactions, t, new_y, p, k, u, c, stage_y)
-    return pulled_back(stage_y, joints, locked)
+        evaluate(problem.rates, t, work.new_state, problem, work.stage_state)
+    evaluate(problem.reactions, t, work.new_state, problem, work.stage_state)
+    return pulled_back(work.stage_state, problem.joints, locked)
 
 
 @inner
@@ -106,22 +109,23 @@ def crossed(y, limits, joints, joint):
 
 
 @inner
-def lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy):
+def lock_touching(t, work, problem, limits, locked):
     """Lock the joints that start on a limit and press against it."""
+    joints, state = problem.joints, work.state
     for _ in range(joints):
-        call(rates, t, y, p, k, u, c, dy)
-        found = False
+        evaluate(problem.rates, t, state, problem, work.start_rates)
+        changed = False
         for j in range(joints):
             if locked[j] != 0.0:
                 continue
             for side, limit in ((1.0, limits[joints + j]), (-1.0, limits[j])):
-                if side * (y[j] - limit) >= -TOUCH:
-                    outward = side * y[joints + j]
-                    if outward > 0.0 or (outward == 0.0 and side * dy[joints + j] > 0.0):
+                if side * (state[j] - limit) >= -TOUCH:
+                    outward = side * state[joints + j]
+                    if outward > 0.0 or (outward == 0.0 and side * work.start_rates[joints + j] > 0.0):
                         locked[j] = side
-                        y[j] = limit
-                        found = True
-        if not found:
+                        state[j] = limit
+                        changed = True
+        if not changed:
             break
 
 
@@ -151,19 +155,27 @@ def crossing(start, gap, speed, end, end_gap, end_speed):
 
 
 @inner
-def meet_limit(step, rates, t, h, arrays, limits, joints, locked):
-    """Shorten a step of size h until the first joint that crosses its limit is on it; the size, and the joint."""
-    y, new_y = arrays[0], arrays[9]
+def meet_limit(t, h, method, work_, control, problem, limits, locked):
+    """Shorten a step of size h until the first joint that crosses its limit is on it; the size, and the joint.
+
+    work_: the array of `Work`.
+    """
+    joints, work = problem.joints, work_of(work_, problem, method)
+    state, new_state = work.state, work.new_state
     joint, side, limit = -1, 0.0, 0.0
     short, long = 0.0, h
     short_gap, short_speed, long_gap, long_speed = 0.0, 0.0, 0.0, 0.0
     for _ in range(60):
-        worst, value = overshoot(new_y, limits, joints, locked)
+        worst, value = overshoot(new_state, limits, joints, locked)
         if value > TOUCH and worst != joint:
             joint = worst
-            side, limit = crossed(new_y, limits, joints, joint)
-            short, short_gap, short_speed = 0.0, min(-1e-300, side * (y[joint] - limit)), side * y[joints + joint]
-        gap, speed = side * (new_y[joint] - limit), side * new_y[joints + joint]
+            side, limit = crossed(new_state, limits, joints, joint)
+            short, short_gap, short_speed = (
+                0.0,
+                min(-1e-300, side * (state[joint] - limit)),
+                side * state[joints + joint],
+            )
+        gap, speed = side * (new_state[joint] - limit), side * new_state[joints + joint]
         if gap > 0.0:
             long, long_gap, long_speed = h, gap, speed
         else:
@@ -171,27 +183,27 @@ def meet_limit(step, rates, t, h, arrays, limits, joints, locked):
         if abs(gap) <= ON_LIMIT or long - short <= 1e-12 * max(1e-3, h):
             break
         h = crossing(short, short_gap, short_speed, long, long_gap, long_speed)
-        take_step(step, rates, t, h, arrays)
+        take_step(t, h, method, work_, control, problem)
     return h, joint
 
 
 @inner
-def leave_limit(step, rates, reactions, stiff, t, h, arrays, pull, joints, locked):
+def leave_limit(t, h, pull, method, work_, control, problem, locked):
     """Shorten a step of size h, at whose end a joint is pulled off its limit by `pull` (N m), until it just is.
 
-    The size, and the joint. Illinois variant of false position.
+    The size, and the joint. Illinois variant of false position. work_: the array of `Work`.
     """
-    y, _, _, _, p, k, u, c, stage_y, _, _, _ = arrays
-    call(rates, t, y, p, k, u, c, stage_y)
-    call(reactions, t, y, p, k, u, c, stage_y)
-    short_value = min(-1e-300, pulled_back(stage_y, joints, locked)[1])
+    work = work_of(work_, problem, method)
+    evaluate(problem.rates, t, work.state, problem, work.stage_state)
+    evaluate(problem.reactions, t, work.state, problem, work.stage_state)
+    short_value = min(-1e-300, pulled_back(work.stage_state, problem.joints, locked)[1])
     short, long, long_value = 0.0, h, pull
     joint = -1
     for _ in range(60):
         part = short_value / (short_value - long_value)
         h = short + min(0.99, max(0.01, part)) * (long - short)
-        take_step(step, rates, t, h, arrays)
-        joint, value = pull_behind(rates, reactions, stiff, t + h, arrays, joints, locked)
+        take_step(t, h, method, work_, control, problem)
+        joint, value = pull_behind(t + h, method, work, problem, locked)
         if value > 0.0:
             if value > 0.5 * long_value:
                 short_value *= 0.5
@@ -206,82 +218,69 @@ def leave_limit(step, rates, reactions, stiff, t, h, arrays, pull, joints, locke
 
 
 @inner
-def parts(joints, limit_offset, locked_offset, p_, c_):
-    """limits and locked as arrays."""
-    return (
-        carray(p_, (limit_offset + 2 * joints,))[limit_offset:],
-        carray(c_, (locked_offset + joints,))[locked_offset:],
-    )
+def limits_and_locked(problem):
+    """Both as arrays."""
+    joints = problem.joints
+    return carray(numbers_at(problem.limits), (2 * joints,)), carray(numbers_at(problem.locked), (joints,))
 
 
-# rates, strike, t, n, rows of u, joints, limit_offset, locked_offset, y, p, k, u, c, dy
-@callback(i8, i8, f8, *[i8] * 5, *[numbers] * 2, whole_numbers, *[numbers] * 3)
-def settle(rates, strike, t, n, rows, joints, limit_offset, locked_offset, y_, p_, k_, u_, c_, dy_):
+# t, method, work, problem
+@callback(f8, method_pointer, numbers, problem_pointer)
+def settle(t, method_, work_, problem_):
     """Lock the joints that start on a limit and press against it, and stop those that move there."""
-    y, dy = carray(y_, (n,)), carray(dy_, (n,))
-    p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
-    limits, locked = parts(joints, limit_offset, locked_offset, p_, c_)
-    lock_touching(rates, t, y, joints, limits, locked, p, k, u, c, dy)
-    for j in range(joints):
-        if locked[j] != 0.0 and y[joints + j] != 0.0:
-            call(strike, t, y, p, k, u, c, dy)
+    method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
+    work = work_of(carray(work_, (work_rows(problem, method), problem.states)), problem, method)
+    limits, locked = limits_and_locked(problem)
+    lock_touching(t, work, problem, limits, locked)
+    for j in range(problem.joints):
+        if locked[j] != 0.0 and work.state[problem.joints + j] != 0.0:
+            evaluate(problem.strike, t, work.state, problem, work.start_rates)
             break
 
 
-# step, rates, reactions, t, h, quiet_until, n, rows of u, joints, limit_offset, locked_offset, stiff, found,
-# and the arrays of `STEP`
-@callback(*[i8] * 3, *[f8] * 3, *[i8] * 6, numbers, *STEP[5:])
-def find_event(
-    step, rates, reactions, t, h, quiet_until, n, rows, joints, limit_offset, locked_offset, stiff, found,
-    y_, start_rates, slopes, stages, p_, k_, u_, c_, stage_y_, new_y_, matrix, pivots,
-):  # fmt: skip
-    """End a step of size h with the first event in it. found: the event, the joint, the size of the step.
+# t, h, method, work, control, problem
+@callback(f8, f8, method_pointer, numbers, control_pointer, problem_pointer)
+def find_event(t, h, method_, work_, control_, problem_):
+    """End a step of size h with the first event in it: `control.event`, its joint, and in `next_step` the step's size.
 
-    Until the time quiet_until no joint is released.
+    Until the time `control.quiet_until` no joint is released.
     """
-    y, stage_y, new_y = carray(y_, (n,)), carray(stage_y_, (n,)), carray(new_y_, (n,))
-    p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
-    limits, locked = parts(joints, limit_offset, locked_offset, p_, c_)
-    arrays = y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
-    part = turning_point(y, new_y, limits, joints, locked, h)
+    method, control, problem = carray(method_, 1)[0], carray(control_, 1)[0], carray(problem_, 1)[0]
+    rows, joints = carray(work_, (work_rows(problem, method), problem.states)), problem.joints
+    work = work_of(rows, problem, method)
+    limits, locked = limits_and_locked(problem)
+    part = turning_point(work.state, work.new_state, limits, joints, locked, h)
     if part > 0.0:
         # The ends of a step do not tell of a touch in between: look where the joint turns.
-        take_step(step, rates, t, part * h, arrays)
-        if overshoot(new_y, limits, joints, locked)[1] > TOUCH:
+        take_step(t, part * h, method, rows, control, problem)
+        if overshoot(work.new_state, limits, joints, locked)[1] > TOUCH:
             h = part * h
         else:
-            take_step(step, rates, t, h, arrays)
+            take_step(t, h, method, rows, control, problem)
     event = NOTHING
-    joint, value = overshoot(new_y, limits, joints, locked)
+    joint, value = overshoot(work.new_state, limits, joints, locked)
     if value > TOUCH:
         event = IMPACT
-        h, joint = meet_limit(step, rates, t, h, arrays, limits, joints, locked)
-    elif t + h > quiet_until and any_locked(locked):
-        joint, value = pull_behind(rates, reactions, stiff, t + h, arrays, joints, locked)
+        h, joint = meet_limit(t, h, method, rows, control, problem, limits, locked)
+    elif t + h > control.quiet_until and any_locked(locked):
+        joint, value = pull_behind(t + h, method, work, problem, locked)
         if value > 0.0:
             event = RELEASE
-            h, joint = leave_limit(step, rates, reactions, stiff, t, h, arrays, value, joints, locked)
-    found[0], found[1], found[2] = event, joint, h
+            h, joint = leave_limit(t, h, value, method, rows, control, problem, locked)
+    control.event, control.joint, control.next_step = event, joint, h
 
 
-# strike, t, n, rows of u, joints, limit_offset, locked_offset, event, joint, y, p, k, u, c, scratch
-@callback(i8, f8, *[i8] * 7, *[numbers] * 2, whole_numbers, *[numbers] * 3)
-def take_effect(strike, t, n, rows, joints, limit_offset, locked_offset, event, joint, y_, p_, k_, u_, c_, scratch_):
-    """What an event does to the state y: an impact stops its joint and jolts the others."""
-    y, scratch = carray(y_, (n,)), carray(scratch_, (n,))
-    p, k, u, c = carray(p_, (1,)), carray(k_, (1,)), carray(u_, (rows, 1)), carray(c_, (1,))
-    limits, locked = parts(joints, limit_offset, locked_offset, p_, c_)
-    if event == RELEASE:
+# t, method, work, control, problem
+@callback(f8, method_pointer, numbers, control_pointer, problem_pointer)
+def take_effect(t, method_, work_, control_, problem_):
+    """What an event does to the state: an impact stops its joint and jolts the others."""
+    method, control, problem = carray(method_, 1)[0], carray(control_, 1)[0], carray(problem_, 1)[0]
+    work = work_of(carray(work_, (work_rows(problem, method), problem.states)), problem, method)
+    limits, locked = limits_and_locked(problem)
+    joint, state = control.joint, work.state
+    if control.event == RELEASE:
         locked[joint] = 0.0
+        control.quiet_until = t + LEAST_FLIGHT
         return
-    locked[joint], y[joint] = crossed(y, limits, joints, joint)
-    call(strike, t, y, p, k, u, c, scratch)
-
-
-@cache
-def addresses() -> IntArray:
-    """Where `settle`, `find_event` and `take_effect` are."""
-    return np.array([settle.address, find_event.address, take_effect.address], dtype=np.int64)
-
-
-NO_LIMITS: IntArray = np.zeros(3, dtype=np.int64)
+    locked[joint], state[joint] = crossed(state, limits, problem.joints, joint)
+    evaluate(problem.strike, t, state, problem, work.stage_state)

@@ -1,49 +1,71 @@
-"""What an integration method is: three compiled functions, called by address.
+"""What an integration method is: two compiled functions and a tableau, all called or read by address.
 
-So the driver (`limb_nodes.solve.integrate`) is compiled once, and a method only where it is used.
+So the driver (`limb_nodes.solve.integrate`) is compiled once, and a method only if it is used.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
-from limb_nodes.foundation.arrays import IntArray
+from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.records import Record, new_record
+from limb_nodes.solve import limits
 from limb_nodes.solve.inner import inner
-from limb_nodes.solve.pointer import Callback, f8, i8, invoke, numbers, whole_numbers
+from limb_nodes.solve.pointer import Callback, f8, i8, numbers
+from limb_nodes.solve.problem import METHOD, control_pointer, method_pointer, problem_pointer
 
-# rates, t, h, n, rows of u, y, start_rates, slopes, stages, p, k, u, c, stage_y, new_y, matrix, pivots
-STEP = (i8, f8, f8, i8, i8, *[numbers] * 5, whole_numbers, *[numbers] * 5, whole_numbers)
-# h, tolerance, n, y, new_y, stages, scale, found
-ERROR = (f8, f8, i8, *[numbers] * 5)
-# t, h, n, count, times, y, new_y, stages, out
-BETWEEN = (f8, f8, i8, i8, *[numbers] * 5)
+# t, h, method, work, control, problem
+STEP = (f8, f8, method_pointer, numbers, control_pointer, problem_pointer)
+# t, h, count, times, out, method, work, problem
+BETWEEN = (f8, f8, i8, numbers, numbers, method_pointer, numbers, problem_pointer)
 
 
 @dataclass(frozen=True)
 class Method:
-    """A method. n: number of states; arrays are given as pointers.
+    """A method; its functions take the arrays of `limb_nodes.solve.problem.Work`.
 
-    step: a step of size h from y to new_y; start_rates are those at t, slopes what the program's
-        `jacobian` gives there (implicit methods). Leaves its stages in stages [7, n].
-    error: found[0], the largest estimated error over its tolerance.
-    between: the states out [count, n] at times within the step.
+    step: a step of size h from time t, from `state` to `new_state`, whose `start_rates` and, for an
+        implicit method, `slopes` are known. Leaves its stages in `stages`, and in `control.error`
+        the largest estimated error over its tolerance.
+    between: the states out [count, n] at times [count] within the step.
+    tableau: its coefficients, C-contiguous. stages: how many it has.
     """
 
     step: Callback
-    error: Callback
     between: Callback
+    tableau: FloatArray
+    stages: int
+    implicit: bool
 
     @cached_property
-    def addresses(self) -> IntArray:
-        """Where the three are."""
-        return np.array([self.step.address, self.error.address, self.between.address], dtype=np.int64)
+    def free(self) -> Record:
+        """The record of the method for problems without limits."""
+        record = new_record(METHOD)
+        record.step, record.between = self.step.address, self.between.address
+        record.tableau, record.stages = self.tableau.ctypes.data, self.stages
+        record.implicit = self.implicit
+        return record
+
+    @cached_property
+    def limited(self) -> Record:
+        """The record of the method for problems with limits."""
+        record = self.free.copy()
+        record.settle, record.find_event = limits.settle.address, limits.find_event.address
+        record.take_effect = limits.take_effect.address
+        return record
 
 
 @inner
-def take_step(step, rates, t, h, arrays):
-    """One step of size h by the method's function. arrays: those of `STEP`, from y to pivots."""
-    y, u = arrays[0], arrays[6]
-    invoke(step, rates, t, h, y.size, u.shape[0], *arrays)
+def judge(errors, work, control):
+    """Leave in `control.error` the largest of the estimated errors [n] over its tolerance."""
+    worst = 0.0
+    for i in range(errors.size):
+        size = max(work.scale[i], abs(work.state[i]), abs(work.new_state[i]))
+        ratio = abs(errors[i]) / (control.tolerance * size)
+        if not ratio <= worst:
+            worst = ratio
+        if not math.isfinite(worst):
+            break
+    control.error = worst

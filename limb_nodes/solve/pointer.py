@@ -1,7 +1,7 @@
-"""Calling compiled right-hand sides by address.
+"""Calling compiled functions by address.
 
-The integrators take a limb's program as numbers. Numba would take functions too, but looks up
-their types anew at every call, which costs more than a whole tick.
+The integrators take a limb's program, and the driver takes a method, as numbers. Numba would take functions too,
+but looks up their types anew at every call, which costs more than a whole tick.
 """
 
 from __future__ import annotations
@@ -12,21 +12,18 @@ from typing import Any
 
 from llvmlite import ir
 from numba import cfunc, types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 f8, i8 = types.float64, types.int64
-numbers, whole_numbers = types.CPointer(f8), types.CPointer(i8)
-# t, y, parameters, index, input, rows of input, context, result
-SIGNATURE = types.void(f8, numbers, numbers, whole_numbers, numbers, i8, numbers, numbers)
+numbers = types.CPointer(f8)
 
 
 class Callback:
-    """A function that is compiled, or loaded, when its address is first asked for."""
+    """A function that is compiled, or loaded, when its address is first asked for. arguments: their numba types."""
 
-    def __init__(self, function: Callable[..., None], signature: Any = SIGNATURE) -> None:
+    def __init__(self, function: Callable[..., None], arguments: tuple[Any, ...]) -> None:
         self.function = function
-        self.signature = signature
+        self.signature = types.void(*arguments)
 
     @cached_property
     def compiled(self) -> Any:
@@ -40,13 +37,13 @@ class Callback:
 
 
 def callback(*arguments: Any) -> Callable[[Callable[..., None]], Callback]:
-    """Makes a `Callback` of a function with arguments of other types."""
-    return lambda function: Callback(function, types.void(*arguments))
+    """Makes a `Callback` of a function with arguments of these types."""
+    return lambda function: Callback(function, arguments)
 
 
 @intrinsic
 def invoke(typingctx, address, *arguments):
-    """Call the function at `address` with numbers, and for each array with where its numbers are."""
+    """Call the function at `address` with numbers, and for each array or record with where its numbers are."""
     signature = types.none(address, types.StarArgTuple(arguments))
 
     def generate(context, builder, signature, given):
@@ -66,22 +63,10 @@ def invoke(typingctx, address, *arguments):
 
 
 @intrinsic
-def call(typingctx, address, t, y, p, k, u, c, out):
-    """Call the right-hand side at `address`: rates `out` at time t and state y."""
-    signature = types.void(address, t, y, p, k, u, c, out)
+def numbers_at(typingctx, address):
+    """The float64 numbers at an address, as a pointer for `carray`."""
 
-    def generate(context, builder, signature, arguments):
-        double, integer = ir.DoubleType(), ir.IntType(64)
-        pointer, integers = double.as_pointer(), integer.as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [double, pointer, pointer, integers, pointer, integer, pointer, pointer])
-        arrays = [
-            context.make_array(array_type)(context, builder, value)
-            for array_type, value in zip(signature.args[2:], arguments[2:], strict=True)
-        ]
-        y_, p_, k_, u_, c_, out_ = arrays
-        rows = cgutils.unpack_tuple(builder, u_.shape)[0]
-        function = builder.inttoptr(arguments[0], kind.as_pointer())
-        builder.call(function, [arguments[1], y_.data, p_.data, k_.data, u_.data, rows, c_.data, out_.data])
-        return context.get_dummy_value()
+    def generate(context, builder, signature, given):
+        return builder.inttoptr(given[0], context.get_value_type(signature.return_type))
 
-    return signature, generate
+    return numbers(address), generate

@@ -29,34 +29,6 @@ def within_unit(values):
 
 
 @njit(cache=True)
-def hold(torque, state, predicted, period, rows):
-    """Fill rows [7, n] for the program's `limb_rates`: torque and slopes [4, n], angle, velocity, curvature.
-
-    predicted: what the tick before expected of the torque [n]; empty where it says nothing.
-    """
-    n = rows.shape[1]
-    for j in range(n):
-        for row in range(4):
-            rows[row, j] = torque[row, j]
-        rows[4, j] = state[j]
-        rows[5, j] = state[n + j]
-        rows[6, j] = (torque[0, j] - predicted[j]) / (period * period) if predicted.size else 0.0
-
-
-@njit(cache=True)
-def predict(rows, state, period, out):
-    """Torque out [n] at the new state by the linear model of the tick before."""
-    n = rows.shape[1]
-    for j in range(n):
-        out[j] = (
-            rows[0, j]
-            + rows[1, j] * (state[j] - rows[4, j])
-            + rows[2, j] * (state[n + j] - rows[5, j])
-            + rows[3, j] * period
-        )
-
-
-@njit(cache=True)
 def same(one, other):
     """Whether two arrays [n] hold the same numbers."""
     for i in range(one.size):

@@ -12,20 +12,34 @@ from __future__ import annotations
 import numpy as np
 
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.records import Record, new_record
 from limb_nodes.model.limb import Limb
-from limb_nodes.solve import limits
 from limb_nodes.solve.explicit import EXPLICIT
+from limb_nodes.solve.held import hold, predict
 from limb_nodes.solve.integrate import DONE, integrate
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import bent, straight
-from limb_nodes.solve.small import hold, predict, same
+from limb_nodes.solve.problem import CONTROL, give_inputs, new_problem
+from limb_nodes.solve.small import same
 from limb_nodes.solve.whole import FAILURES, SolveError, WholeModel
 
 TICK_TOLERANCE = 1e-9
 NO_TIMES = np.empty(0)
+NO_ROWS = np.empty((0, 0))
 # A tick of the rehearsal (s).
 REHEARSAL = 1e-3
-NO_ROWS = np.empty((0, 0))
+
+
+def tick_control() -> Record:
+    """How exactly a tick is solved."""
+    control = new_record(CONTROL)
+    control.tolerance = TICK_TOLERANCE
+    return control
+
+
+def set_tick(control: Record, period: float) -> None:
+    """Let a tick of `period` (s) be solved next, in one step if it will do."""
+    control.end = control.longest = control.next_step = period
 
 
 class MuscleStepper:
@@ -39,13 +53,24 @@ class MuscleStepper:
         layout = self.model.layout
         self.joints = layout.joints
         self.internal: FloatArray = layout.initial_states.copy()
-        self._scale = layout.state_scales
-        self._context = self.model.context(0.0, 1.0)
         self._state = np.zeros(2 * layout.joints + layout.states)
         self._muscles = np.zeros((layout.muscles, len(MUSCLE_OUTPUTS)))
         self._units = np.zeros((layout.units, len(UNIT_OUTPUTS)))
-        self._progress = np.zeros(4)
+        self._control = tick_control()
+        self._start()
         self._rehearse()
+
+    def _start(self) -> None:
+        """Fresh data, and the muscles alone as a problem of it."""
+        layout = self.model.layout
+        self._data = self.model.new_data(0.0, 1.0)
+        rates = self.model.program.muscle_rates_c.address if layout.states else 0
+        self._problem = new_problem(layout.states, rates, layout.model, self._data)
+
+    def adopt(self, model: WholeModel) -> None:
+        """Go on with the numbers of another model that has the same program."""
+        self.model = model
+        self._start()
 
     def _rehearse(self) -> None:
         """Do what a tick does, so that it is compiled and loaded before the first."""
@@ -59,7 +84,7 @@ class MuscleStepper:
             self.advance(posture, posture, drive, drive, REHEARSAL, last_drive)
         self.observe(*posture, excitation)
         self.internal[:] = layout.initial_states
-        self._context = self.model.context(0.0, 1.0)
+        self._start()
 
     @property
     def shown(self) -> tuple[FloatArray, FloatArray]:
@@ -68,8 +93,8 @@ class MuscleStepper:
 
     def drive(self, excitation: FloatArray) -> FloatArray:
         """What excitations [muscles] do to muscles and motor units [drives]."""
-        found: FloatArray = self.model.drives(excitation[np.newaxis, :])[0]
-        return found
+        drives: FloatArray = self.model.drives(excitation[np.newaxis, :])[0]
+        return drives
 
     def torque(
         self,
@@ -83,24 +108,22 @@ class MuscleStepper:
         """Torque [n] (N m) and its slopes in angle, velocity and time, rows of [4, n].
 
         drive, next_drive: at this tick and one `period` (s) later. last_drive: one period before,
-        where it is known; the input is then a parabola instead of a straight line.
+        if it is known; the input is then a parabola instead of a straight line.
         """
-        n, program = self.joints, self.model.program
+        self._set_state(angle, velocity)
+        self._data.period = period
+        out = np.empty((4, self.joints))
+        model = self.model
+        model.program.torque_slopes(
+            self._state, interval(last_drive, drive, next_drive), model.layout.model, self._data, out
+        )
+        return out
+
+    def _set_state(self, angle: FloatArray, velocity: FloatArray) -> None:
+        n = self.joints
         self._state[:n] = angle
         self._state[n : 2 * n] = velocity
         self._state[2 * n :] = self.internal
-        self._context[:2] = 0.0, period
-        out = np.empty((4, n))
-        layout = self.model.layout
-        program.torque_slopes(
-            self._state,
-            layout.parameters,
-            layout.index,
-            interval(last_drive, drive, next_drive),
-            self._context,
-            out,
-        )
-        return out
 
     def advance(
         self,
@@ -118,37 +141,17 @@ class MuscleStepper:
         """
         if self.internal.size == 0:
             return
-        program, layout = self.model.program, self.model.layout
-        c = self._context
-        c[:2] = 0.0, period
-        c[program.CUBIC : program.TORQUE] = np.concatenate([*before, *after])
-        self._progress[:3] = 0.0
-        self._progress[3] = period
-        status = integrate(
-            EXPLICIT.addresses,
-            limits.NO_LIMITS,
-            program.muscle_rates_c.address,
-            0,
-            0,
-            0,
-            0.0,
-            period,
-            self.internal,
-            NO_TIMES,
-            NO_ROWS,
-            self._scale,
-            layout.parameters,
-            layout.index,
-            interval(last_drive, drive, next_drive),
-            c,
-            0,
-            0,
-            0,
-            NO_TIMES,
-            TICK_TOLERANCE,
-            period,
-            self._progress,
+        data = self._data
+        data.period = period
+        (data.angles_before[:], data.velocities_before[:]), (data.angles_after[:], data.velocities_after[:]) = (
+            before,
+            after,
         )
+        inputs = interval(last_drive, drive, next_drive)
+        give_inputs(self._problem, inputs)
+        set_tick(self._control, period)
+        scale, states = self.model.layout.state_scales, self.internal
+        status = integrate(EXPLICIT.free, self._problem, self._control, NO_TIMES, scale, states, NO_TIMES, NO_ROWS)
         if status != DONE:
             raise SolveError(f"{self.model.limb.file}: the muscles cannot be advanced: {FAILURES[status]}")
 
@@ -157,19 +160,9 @@ class MuscleStepper:
 
         Both arrays are used again by the next call.
         """
-        n, layout = self.joints, self.model.layout
-        self._state[:n] = angle
-        self._state[n : 2 * n] = velocity
-        self._state[2 * n :] = self.internal
-        self.model.program.observe(
-            self._state,
-            excitation,
-            layout.parameters,
-            layout.index,
-            self._context,
-            self._muscles,
-            self._units,
-        )
+        self._set_state(angle, velocity)
+        model = self.model
+        model.program.observe(self._state, excitation, model.layout.model, self._data, self._muscles, self._units)
         return self._muscles, self._units
 
 
@@ -182,19 +175,24 @@ class LimbStepper:
 
     def __init__(self, limb: Limb) -> None:
         self.model = WholeModel(limb)
-        n = self.model.layout.joints
-        self.joints = n
+        self.joints = n = self.model.layout.joints
         state = self.model.initial_state()[: 2 * n]
         self._state: FloatArray = state.copy()
         self._scale = self.model.state_scale[: 2 * n]
-        self._context = self.model.context(0.0, 1.0)
         self._rates = np.empty(2 * n)
-        self._torque = np.zeros((7, n))
-        self._progress = np.zeros(4)
-        # What the last step expects of the next torque; empty where it says nothing.
+        self._control = tick_control()
+        # What the last step expects of the next torque; empty if it says nothing.
         self._expected: FloatArray = np.empty(n)
         self._predicted = NO_TIMES
+        self._start()
         self._rehearse(state)
+
+    def _start(self) -> None:
+        """Fresh data, and the chain alone as a problem of it."""
+        model = self.model
+        self._data = model.new_data(0.0, 1.0)
+        self._problem = new_problem(2 * self.joints, model.program.limb_rates_c.address, model.layout.model, self._data)
+        model.limit(self._problem, self._data)
 
     def _rehearse(self, start: FloatArray) -> None:
         """Do what a tick does, so that it is compiled and loaded before the first."""
@@ -203,7 +201,7 @@ class LimbStepper:
         self.step(torque, REHEARSAL)
         self.step(torque, REHEARSAL)
         self._state[:] = start
-        self._context = self.model.context(0.0, 1.0)
+        self._start()
         self._predicted = NO_TIMES
 
     @property
@@ -219,62 +217,29 @@ class LimbStepper:
     @property
     def load(self) -> FloatArray:
         """Force (N) and torque (N m) of the environment on the tip: x, y, torque."""
-        return self._context[2:5]
+        load: FloatArray = self._data.load
+        return load
 
     def acceleration(self, torque: FloatArray) -> FloatArray:
         """Joint accelerations [n] (rad/s^2) at the current tick under rows of torque [4, n]."""
-        hold(torque, self._state, NO_TIMES, 1.0, self._torque)
-        program, layout = self.model.program, self.model.layout
-        program.limb_rates(
-            0.0,
-            self._state,
-            layout.parameters,
-            layout.index,
-            self._torque,
-            self._context,
-            self._rates,
-        )
+        data, model = self._data, self.model
+        hold(torque, self._state, NO_TIMES, 1.0, data.held)
+        model.program.limb_rates(0.0, self._state, NO_ROWS, model.layout.model, data, self._rates)
         return self._rates[self.joints :].copy()
 
     def step(self, torque: FloatArray, period: float) -> None:
         """Advance by `period` (s) under torque and slopes [4, n]. Raises SolveError."""
-        hold(torque, self._state, self._predicted, period, self._torque)
-        program, layout, n = self.model.program, self.model.layout, self.joints
-        limited = self.model.limited
-        locked = self._context[program.LOCKED : program.LOCKED + n]
-        held = locked.copy()
-        self._progress[:3] = 0.0
-        self._progress[3] = period
-        status = integrate(
-            EXPLICIT.addresses,
-            limits.addresses() if limited else limits.NO_LIMITS,
-            program.limb_rates_c.address,
-            0,
-            program.reactions_c.address if limited else 0,
-            program.strike_c.address if limited else 0,
-            0.0,
-            period,
-            self._state,
-            NO_TIMES,
-            NO_ROWS,
-            self._scale,
-            layout.parameters,
-            layout.index,
-            self._torque,
-            self._context,
-            n if limited else 0,
-            self.model.limit_offset,
-            program.LOCKED,
-            NO_TIMES,
-            TICK_TOLERANCE,
-            period,
-            self._progress,
-        )
+        data = self._data
+        hold(torque, self._state, self._predicted, period, data.held)
+        before = data.locked.copy()
+        set_tick(self._control, period)
+        how = EXPLICIT.limited if self.model.limited else EXPLICIT.free
+        status = integrate(how, self._problem, self._control, NO_TIMES, self._scale, self._state, NO_TIMES, NO_ROWS)
         if status != DONE:
             raise SolveError(f"{self.model.limb.file}: the limb cannot be advanced: {FAILURES[status]}")
         # An impact bends the torque at once, which tells nothing about the tick that follows.
-        if same(locked, held):
-            predict(self._torque, self._state, period, self._expected)
+        if same(data.locked, before):
+            predict(data.held, self._state, period, self._expected)
             self._predicted = self._expected
         else:
             self._predicted = NO_TIMES
@@ -282,8 +247,5 @@ class LimbStepper:
 
 def interval(last_drive: FloatArray | None, drive: FloatArray, next_drive: FloatArray) -> FloatArray:
     """The input over one tick."""
-    if last_drive is None:
-        found: FloatArray = straight(drive, next_drive)
-    else:
-        found = bent(last_drive, drive, next_drive)
-    return found
+    piece: FloatArray = straight(drive, next_drive) if last_drive is None else bent(last_drive, drive, next_drive)
+    return piece

@@ -4,20 +4,22 @@ A table holds what a limb's laws give over a range of one variable: smooth piece
 where a law jumps or has a corner, which are found by bisection, each split until its polynomial is
 as good as the laws themselves. Where that fails, the coefficients are NaN and the laws must be asked.
 
-The functions are given by address, as those of `limb_nodes.solve.pointer.call`: the variable in
-place of the time, the number of its owner in place of the state, values in the result.
+The functions are those of a problem (`limb_nodes.solve.problem`), called as its rates: the variable in place of the
+time, the number of its owner in place of the state, values in the result.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from limb_nodes.foundation.arrays import FloatArray, IntArray
+from limb_nodes.foundation.records import Record
 from limb_nodes.solve.inner import inner
-from limb_nodes.solve.pointer import call
+from limb_nodes.solve.problem import evaluate
 
 TOLERANCE = 2e-13
 NODES = 8
@@ -30,52 +32,63 @@ BUCKETS = 1024
 _NODES = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
 _TO_POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))
 _CHECKS = np.array([-0.998, -0.29, 0.1, 0.67, 0.998])
-_NO_INPUT = np.empty((1, 1))
+
+
+class Wanted(NamedTuple):
+    """Which values of a function are wanted, and where.
+
+    values: the first, and the one behind the last. span: lowest and highest of the variable. scale: [values], their
+    typical sizes; errors stay below tolerance * scale.
+    """
+
+    values: tuple[int, int]
+    span: tuple[float, float]
+    scale: FloatArray
+    tolerance: float
 
 
 @inner
-def piece(function, owner, p, k, first, last, left, right, scale, scratch, coefficients):
-    """Fill coefficients [last - first, NODES], powers of -1 to 1 across the piece; the largest error over its scale.
-
-    first, last: the values of the function that are wanted.
-    """
-    width = last - first
+def piece(problem, owner, wanted, left, right, scratch, coefficients):
+    """Fill coefficients [values, NODES], powers of -1 to 1 across the piece; the largest error over its scale."""
+    first = wanted.values[0]
+    width = wanted.values[1] - first
     middle, half = 0.5 * (left + right), 0.5 * (right - left)
     for j in range(width):
         for power in range(NODES):
             coefficients[j, power] = 0.0
     for node in range(NODES):
-        call(function, middle + half * _NODES[node], owner, p, k, _NO_INPUT, scratch, scratch)
+        evaluate(problem.rates, middle + half * _NODES[node], owner, problem, scratch)
         for j in range(width):
             for power in range(NODES):
                 coefficients[j, power] += _TO_POWERS[power, node] * scratch[first + j]
     worst = 0.0
     for s in _CHECKS:
-        call(function, middle + half * s, owner, p, k, _NO_INPUT, scratch, scratch)
+        evaluate(problem.rates, middle + half * s, owner, problem, scratch)
         for j in range(width):
             value = coefficients[j, NODES - 1]
             for power in range(NODES - 2, -1, -1):
                 value = value * s + coefficients[j, power]
-            error = abs(value - scratch[first + j]) / scale[j]
+            error = abs(value - scratch[first + j]) / wanted.scale[j]
             if not error <= worst:
                 worst = error
     return worst
 
 
 @inner
-def corner(function, owner, p, k, first, last, left, right, scale, scratch):
+def corner(problem, owner, wanted, left, right, scratch):
     """The place between left and right where values jump or bend most, to the next number."""
+    first, last = wanted.values
     values = np.empty((5, last - first))
     while True:
         step = 0.25 * (right - left)
         for i in range(5):
-            call(function, left + i * step, owner, p, k, _NO_INPUT, scratch, scratch)
+            evaluate(problem.rates, left + i * step, owner, problem, scratch)
             for j in range(last - first):
                 values[i, j] = scratch[first + j]
         before = after = 0.0
         for j in range(last - first):
-            before = max(before, abs(values[0, j] - 2.0 * values[1, j] + values[2, j]) / scale[j])
-            after = max(after, abs(values[2, j] - 2.0 * values[3, j] + values[4, j]) / scale[j])
+            before = max(before, abs(values[0, j] - 2.0 * values[1, j] + values[2, j]) / wanted.scale[j])
+            after = max(after, abs(values[2, j] - 2.0 * values[3, j] + values[4, j]) / wanted.scale[j])
         middle = left + 2.0 * step
         if middle <= left or middle >= right:
             return right
@@ -86,8 +99,9 @@ def corner(function, owner, p, k, first, last, left, right, scale, scratch):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def find_corners(function, owners, p, k, first, last, low, high, scale, scratch, coefficients, found):
-    """Fill found with the places from low to high where values of an owner jump or bend; how many there are."""
+def find_corners(problem, owners, wanted, scratch, coefficients, places):
+    """Fill places with those in the span where values of an owner jump or bend; how many there are."""
+    low, high = wanted.span
     owner = np.zeros(1)
     count = 0
     for number in owners:
@@ -97,13 +111,13 @@ def find_corners(function, owners, p, k, first, last, low, high, scale, scratch,
         while level >= 0:
             size = (high - low) / (1 << level)
             left, right = low + at * size, low + (at + 1) * size
-            error = piece(function, owner, p, k, first, last, left, right, scale, scratch, coefficients)
+            error = piece(problem, owner, wanted, left, right, scratch, coefficients)
             smooth = error <= TOLERANCE
             if not smooth and level < SEARCH_DEPTH:
                 level, at = level + 1, 2 * at
                 continue
-            if not smooth and count < found.size:
-                found[count] = corner(function, owner, p, k, first, last, left, right, scale, scratch)
+            if not smooth and count < places.size:
+                places[count] = corner(problem, owner, wanted, left, right, scratch)
                 count += 1
             while level >= 0 and at % 2 == 1:
                 level, at = level - 1, at // 2
@@ -112,10 +126,10 @@ def find_corners(function, owners, p, k, first, last, low, high, scale, scratch,
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def fit(function, number, breaks, tolerance, p, k, first, last, scale, scratch, edges, table):
-    """Fill edges [pieces + 1] and table [pieces, last - first, NODES] between breaks; how many pieces there are.
+def fit(problem, number, breaks, wanted, scratch, edges, table):
+    """Fill edges [pieces + 1] and table [pieces, values, NODES] between breaks; how many pieces there are.
 
-    The coefficients are NaN where no polynomial will do.
+    The coefficients are NaN if no polynomial will do.
     """
     owner = np.full(1, float(number))
     least = LEAST_WIDTH * (breaks[-1] - breaks[0])
@@ -124,13 +138,13 @@ def fit(function, number, breaks, tolerance, p, k, first, last, scale, scratch, 
         left, end = breaks[at], breaks[at + 1]
         right = end
         while left < end:
-            error = piece(function, owner, p, k, first, last, left, right, scale, scratch, table[pieces])
-            if not error <= tolerance:
+            error = piece(problem, owner, wanted, left, right, scratch, table[pieces])
+            if not error <= wanted.tolerance:
                 # Pieces are halved from the left; the rest is tried whole again.
                 if right - left > least and pieces < len(table) - breaks.size:
                     right = 0.5 * (left + right)
                     continue
-                for j in range(last - first):
+                for j in range(wanted.scale.size):
                     table[pieces, j, 0] = np.nan
             edges[pieces] = left
             pieces += 1
@@ -161,34 +175,19 @@ class Table:
     starts: IntArray
 
 
-def tabulate(
-    function: int,
-    owner: int,
-    searched: tuple[int, IntArray],
-    parameters: FloatArray,
-    index: IntArray,
-    wanted: tuple[int, int],
-    size: int,
-    span: tuple[float, float],
-    scale: FloatArray,
-    tolerance: float = TOLERANCE,
-    buckets: int = BUCKETS,
-) -> Table:
+def tabulate(problem: Record, owner: int, searched: tuple[Record, IntArray], wanted: Wanted) -> Table:
     """The table of an owner's values.
 
-    function: its address. searched: another function and its owners, whose corners are those of the values.
-    wanted: the first value and the one behind the last, of `size`. scale: of each value wanted; errors stay
-    below tolerance * scale.
+    searched: another problem and its owners, whose corners are those of the values.
     """
-    width = wanted[1] - wanted[0]
-    scratch, coefficients = np.zeros(size), np.empty((width, NODES))
-    found = np.empty(MOST_PIECES // 2)
-    given = parameters, index, *wanted
-    count = find_corners(searched[0], searched[1], *given, *span, scale, scratch, coefficients, found)
-    breaks = np.unique(np.concatenate([span, found[:count]]))
+    width = wanted.scale.size
+    scratch, coefficients = np.zeros(problem.states), np.empty((width, NODES))
+    places = np.empty(MOST_PIECES // 2)
+    count = find_corners(*searched, wanted, scratch, coefficients, places)
+    breaks = np.unique(np.concatenate([wanted.span, places[:count]]))
     edges, table = np.empty(MOST_PIECES + 1), np.empty((MOST_PIECES, width, NODES))
-    pieces = fit(function, owner, breaks, tolerance, *given, scale, scratch, edges, table)
+    pieces = fit(problem, owner, breaks, wanted, scratch, edges, table)
     edges = edges[: pieces + 1].copy()
-    starts = np.empty(buckets, dtype=np.int64)
+    starts = np.empty(BUCKETS, dtype=np.int64)
     first_pieces(edges, starts)
     return Table(edges, table[:pieces].copy(), starts)

@@ -7,7 +7,6 @@ building the limb with two values of it; from then on the number goes there dire
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from threading import Lock
@@ -21,7 +20,8 @@ from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels import motor_unit, sarcomere
 from limb_nodes.model.check import check_geometry
 from limb_nodes.model.chosen import ChosenLaw
-from limb_nodes.model.layout import GROUP_INDEX, MUSCLE_INDEX, UNIT_INDEX, Layout, Packer, chain_block
+from limb_nodes.model.kinds import MuscleKind, UnitKind
+from limb_nodes.model.layout import Layout, build_layout, same_structure
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
 from limb_nodes.model.load import BASE_ANGLE, SEGMENT_PARAMETERS, TIP_TORQUE, with_values
 from limb_nodes.solve.whole import WholeModel
@@ -104,40 +104,21 @@ class Variants:
         limb = changed(self.limb, changes)
         if any(slot.kind not in ("limb", "segment") for slot in changes):
             return self.adopted(limb)
-        block = chain_block(limb)
-        parameters = self.base.layout.parameters.copy()
-        parameters[: len(block)] = block
-        return self.variant(limb, replace(self.base.layout, limb=limb, parameters=parameters))
+        return self.base.sibling(self.base.layout.of_limb(limb))
 
     def adopted(self, limb: Limb) -> WholeModel:
         """The model of a limb, with the program that is there if its structure is the same."""
-        base = self.base.layout
-        packer = Packer(limb)
-        # Kinds that are known need not be taken apart again.
-        packer.muscle_kinds += base.muscle_kinds
-        packer.unit_kinds += base.unit_kinds
-        for number, muscle in enumerate(limb.muscles):
-            packer.add_muscle(number, muscle)
-        layout = packer.layout()
-        if not same_structure(base, layout):
-            with BUILDING:
-                return WholeModel(limb)
-        return self.variant(limb, layout)
-
-    def variant(self, limb: Limb, layout: Layout) -> WholeModel:
-        """A model with the program of the base."""
-        model = copy.copy(self.base)
-        # What has been found for the base does not hold for its variants.
-        for name in ("suited_method", "drive_table", "limited"):
-            model.__dict__.pop(name, None)
-        model.limb, model.layout = limb, layout
-        return model
+        layout = build_layout(limb, self.base.layout)
+        if same_structure(self.base.layout, layout):
+            return self.base.sibling(layout)
+        with BUILDING:
+            return WholeModel(limb)
 
     def same_drives(self, model: WholeModel) -> bool:
         """Whether an input does the same to the motor units of a model as to those of the base."""
         if model.program is not self.base.program:
             return False
-        new, old = model.layout.parameters, self.base.layout.parameters
+        new, old = model.layout.model.parameters, self.base.layout.model.parameters
         return bool(np.array_equal(new[self.driving], old[self.driving]))
 
     def slots(self, place: str, value: Any) -> Slots | None:
@@ -215,33 +196,17 @@ def changed_law(chosen: ChosenLaw, name: str, value: float) -> ChosenLaw:
     return ChosenLaw(chosen.law, {**chosen.values, name: value}, chosen.place, chosen.module)
 
 
-def same_structure(one: Layout, other: Layout) -> bool:
-    """Whether two limbs have one program and every number at the same place."""
-    return (
-        len(one.muscle_kinds) == len(other.muscle_kinds)
-        and len(one.unit_kinds) == len(other.unit_kinds)
-        and one.joints == other.joints
-        and one.parameters.shape == other.parameters.shape
-        and np.array_equal(one.index, other.index)
-    )
-
-
 def drive_entries(layout: Layout) -> IntArray:
     """The entries of the parameters on which `drives` depends."""
     entries: set[int] = set()
-    first = layout.muscles * len(MUSCLE_INDEX)
-    second = first + layout.groups * len(GROUP_INDEX)
-    groups = layout.index[first:second].reshape(-1, len(GROUP_INDEX))
-    units = layout.index[second:].reshape(-1, len(UNIT_INDEX))
-    for record in layout.index[:first].reshape(-1, len(MUSCLE_INDEX)):
-        entries |= driven(layout.muscle_kinds[record[0]], record[2], set())
-    for records in (groups, units):
-        for record in records:
-            entries |= driven(layout.unit_kinds[record[0]], record[1], {"parallel_sarcomeres"})
+    for muscle in layout.model.muscles:
+        entries |= driven(layout.muscle_kinds[muscle.kind], muscle.parameters, set())
+    for unit in (*layout.model.groups, *layout.model.units):
+        entries |= driven(layout.unit_kinds[unit.kind], unit.parameters, {"parallel_sarcomeres"})
     return np.array(sorted(entries), dtype=np.int64)
 
 
-def driven(kind: Any, offset: int, more: set[str]) -> set[int]:
+def driven(kind: MuscleKind | UnitKind, offset: int, more: set[str]) -> set[int]:
     """Entries of one row that its kind's drive stage reads."""
     used = {symbol for bound in kind.stages["drive"] for symbol in bound.symbols} | more
     return {int(offset) + column for column, name in enumerate(kind.columns) if name in used}

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from types import ModuleType
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.records import Record, new_record
+from limb_nodes.model.chain import Chain, chain_of
 from limb_nodes.model.layout import Layout, build_layout
 from limb_nodes.model.limb import Limb
-from limb_nodes.solve import limits
 from limb_nodes.solve.compile import compiled
+from limb_nodes.solve.data import data_type
 from limb_nodes.solve.drive_table import DriveTable
 from limb_nodes.solve.explicit import EXPLICIT
 from limb_nodes.solve.implicit import IMPLICIT
@@ -27,11 +31,12 @@ from limb_nodes.solve.integrate import (
 )
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import corners, pieces
+from limb_nodes.solve.problem import CONTROL, give_inputs, new_problem
 
 ANGLE_SCALE, VELOCITY_SCALE = 1.0, 10.0
 TOLERANCE = 1e-9
 LONGEST_STEP = 0.1
-# Samples from which a table of the drives costs less than their laws, and from which it does although it has to be
+# Samples from which a table of the drives costs less than their laws, and from which it does so even if it has to be
 # compiled for one solve.
 TABLE_PAYS = 2_000
 TABLE_PAYS_ONCE = 1_000_000
@@ -71,27 +76,42 @@ class Movement:
     steps: tuple[int, int]
 
 
+class Stretch(NamedTuple):
+    """A part of a movement that is to be solved.
+
+    times: s [T], rising, at which the states are wanted. inputs: pieces of the drives [rows, 4 drives], the first
+    from 0 s on. stops: times (s) of their corners. period: of a piece (s).
+    """
+
+    times: FloatArray
+    inputs: FloatArray
+    stops: FloatArray
+    period: float
+
+
 class WholeModel:
     """A limb ready to be solved.
 
     once: whether for one solve only, before which as little as possible is to be compiled.
-    limits: offset of the joint limits in the parameters. state_scale: [2 n + internal states].
+    layout: the limb as arrays. program: the compiled functions for it. state_scale: [2 n + internal states].
     """
 
     def __init__(self, limb: Limb, *, once: bool = False) -> None:
-        self.limb = limb
-        self.table_pays = TABLE_PAYS_ONCE if once else TABLE_PAYS
-        self.layout: Layout = build_layout(limb)
-        self.program: ModuleType = compiled(self.layout)
-        n = self.layout.joints
-        self.limit_offset = 3 + n * n + 2 * n
+        layout = build_layout(limb)
+        self._adopt(layout, compiled(layout), TABLE_PAYS_ONCE if once else TABLE_PAYS)
+
+    def _adopt(self, layout: Layout, program: ModuleType, table_pays: int) -> None:
+        self.limb, self.layout, self.program, self.table_pays = layout.limb, layout, program, table_pays
+        n = layout.joints
         self.state_scale: FloatArray = np.concatenate(
-            [
-                np.full(n, ANGLE_SCALE),
-                np.full(n, VELOCITY_SCALE),
-                self.layout.state_scales,
-            ]
+            [np.full(n, ANGLE_SCALE), np.full(n, VELOCITY_SCALE), layout.state_scales]
         )
+
+    def sibling(self, layout: Layout) -> WholeModel:
+        """The model of another limb of the same structure, with this one's program."""
+        other = WholeModel.__new__(WholeModel)
+        other._adopt(layout, self.program, self.table_pays)
+        return other
 
     def initial_state(self) -> FloatArray:
         """Joint angles, joint velocities and internal states at the start."""
@@ -104,20 +124,61 @@ class WholeModel:
             ]
         )
 
-    def context(self, start: float, period: float) -> FloatArray:
-        """Fresh scratch with the limb's load, for input samples every `period` s from `start`."""
-        c = np.zeros(self.program.CONTEXT)
-        c[:5] = [start, period, *self.limb.tip_force, self.limb.tip_torque]
-        return c
+    @cached_property
+    def chain(self) -> Chain:
+        """The constants of the chain of segments."""
+        return chain_of(self.layout.model.chain, self.layout.joints)
+
+    @cached_property
+    def data_type(self) -> np.dtype[Any]:
+        """The type of the limb's data."""
+        return data_type(self.layout)
+
+    def new_data(self, start: float, period: float) -> Record:
+        """Fresh data with the limb's load, for input samples every `period` s from `start` (s) on."""
+        data = new_record(self.data_type)
+        data.start, data.period = start, period
+        data.load[:] = [*self.limb.tip_force, self.limb.tip_torque]
+        return data
+
+    def problem(self, data: Record, *, jacobian: bool = False) -> Record:
+        """The whole limb as a problem of the integrators; `give_inputs` must follow.
+
+        jacobian: whether the slopes of the rates are needed too. The caller keeps `data` alive.
+        """
+        program = self.program
+        problem = new_problem(self.state_scale.size, program.rates_c.address, self.layout.model, data)
+        problem.jacobian = program.jacobian_c.address if jacobian else 0
+        self.limit(problem, data)
+        return problem
+
+    def limit(self, problem: Record, data: Record) -> None:
+        """Let the joints of a problem have their limits, if the limb has some."""
+        if self.limited:
+            problem.joints = self.layout.joints
+            problem.limits, problem.locked = self.chain.lowest.ctypes.data, data.locked.ctypes.data
+            problem.reactions, problem.strike = self.program.reactions_c.address, self.program.strike_c.address
+
+    def right_hand_side(self, inputs: FloatArray, period: float) -> Callable[[float, FloatArray], FloatArray]:
+        """The rates [states] as a function of time (s) and state [states].
+
+        inputs: pieces of the drives [rows, 4 drives], each as long as `period` (s).
+        """
+        data, model, program = self.new_data(0.0, period), self.layout.model, self.program
+
+        def rates(t: float, y: FloatArray) -> FloatArray:
+            out = np.empty(y.size)
+            program.rates(t, np.ascontiguousarray(y), inputs, model, data, out)
+            return out
+
+        return rates
 
     def slopes(self, state: FloatArray, excitation: FloatArray) -> FloatArray:
         """Slopes of the rates [states, states] (Jacobian) at a state under excitations [muscles]."""
-        size = state.size
-        out = np.empty(size * (size + 1))
-        u = pieces(self.drives(excitation[np.newaxis, :]))
-        layout = self.layout
-        self.program.jacobian(0.0, state, layout.parameters, layout.index, u, self.context(0.0, 1.0), out)
-        return out[: size * size].reshape(size, size)
+        out = np.empty((state.size + 1, state.size))
+        inputs = pieces(self.drives(excitation[np.newaxis, :]))
+        self.program.jacobian(0.0, state, inputs, self.layout.model, self.new_data(0.0, 1.0), out)
+        return out[:-1].T
 
     def stiffness(self) -> float:
         """Fastest rate (1/s) of the limb at its start with all muscles fully excited.
@@ -125,24 +186,18 @@ class WholeModel:
         By differences: the program of the exact slopes need not be compiled to find that it is not
         needed.
         """
-        state, layout = self.initial_state(), self.layout
+        state = self.initial_state()
         slopes = np.empty((state.size, state.size))
-        inputs = pieces(self.drives(np.ones((1, layout.muscles))))
-        difference_slopes(
-            self.program.rates_c.address,
-            state,
-            layout.parameters,
-            layout.index,
-            inputs,
-            self.context(0.0, 1.0),
-            self.state_scale,
-            slopes,
-        )
+        inputs = pieces(self.drives(np.ones((1, self.layout.muscles))))
+        data = self.new_data(0.0, 1.0)
+        problem = self.problem(data)
+        give_inputs(problem, inputs)
+        difference_slopes(problem, state, self.state_scale, slopes)
         return float(np.abs(np.linalg.eigvals(slopes)).max())
 
     @cached_property
     def suited_method(self) -> str:
-        """The implicit method where stability would hold the explicit one to small steps."""
+        """The implicit method if stability would hold the explicit one to small steps."""
         return "implicit" if self.stiffness() > STIFF else "explicit"
 
     @cached_property
@@ -154,10 +209,9 @@ class WholeModel:
         """What the input [T, muscles] does to muscles and motor units [T, drives]."""
         given = np.ascontiguousarray(excitation, dtype=np.float64)
         if len(given) >= self.table_pays:
-            found: FloatArray = self.drive_table.look_up(given)
-            return found
+            return self.drive_table.look_up(given)
         out = np.zeros((len(given), self.layout.drives))
-        self.program.drives(given, self.layout.parameters, self.layout.index, out)
+        self.program.drives(given, self.layout.model, out)
         return out
 
     @cached_property
@@ -181,32 +235,24 @@ class WholeModel:
             is smooth between samples, but for corners (`limb_nodes.solve.pieces`).
         tolerance: of the local error, relative to the state or its typical size.
         method: "explicit", "implicit", or "auto", which chooses by `stiffness`.
-        observe: whether to fill in accelerations and what muscles and motor units show; where not,
+        observe: whether to fill in accelerations and what muscles and motor units show; if not,
             those have no rows.
-        Raises SolveError where the equations cannot be solved further.
+        Raises SolveError if the equations cannot be solved further.
         """
         period = 1.0 / rate
         times: FloatArray = np.arange(len(excitation), dtype=np.float64) * period
-        samples = self.drives(excitation)
-        inputs, stops = prepared(samples, period)
-        context = self.context(0.0, period)
-        states, steps = self.solve(times, inputs, stops, context, tolerance, method)
+        stretch = Stretch(times, *prepared(self.drives(excitation), period), period)
+        states, steps = self.solve(stretch, tolerance, method)
         n, layout = self.layout.joints, self.layout
         shown = len(times) if observe else 0
         acceleration = np.empty((shown, n))
         muscle = np.zeros((shown, layout.muscles, len(MUSCLE_OUTPUTS)))
         unit = np.zeros((shown, layout.units, len(UNIT_OUTPUTS)))
         if observe:
-            self.accelerations(times, states, inputs, context, acceleration)
-            self.program.observe_all(
-                states,
-                np.ascontiguousarray(excitation, dtype=np.float64),
-                layout.parameters,
-                layout.index,
-                context,
-                muscle,
-                unit,
-            )
+            data = self.new_data(0.0, period)
+            self.program.accelerations(times, states, stretch.inputs, layout.model, data, acceleration)
+            given = np.ascontiguousarray(excitation, dtype=np.float64)
+            self.program.observe_all(states, given, layout.model, data, muscle, unit)
         return Movement(
             time=times,
             angle=states[:, :n],
@@ -220,63 +266,25 @@ class WholeModel:
             steps=steps,
         )
 
-    def solve(
-        self,
-        times: FloatArray,
-        inputs: FloatArray,
-        stops: FloatArray,
-        context: FloatArray,
-        tolerance: float,
-        method: str,
-    ) -> tuple[FloatArray, tuple[int, int]]:
-        """States [T, states] at given times, and the accepted and rejected steps.
+    def solve(self, stretch: Stretch, tolerance: float, method: str) -> tuple[FloatArray, tuple[int, int]]:
+        """States [T, states] at the times of a stretch, and the accepted and rejected steps.
 
-        inputs: pieces of the drives. stops: times of corners. method: as for `simulate`.
-        Raises SolveError.
+        tolerance, method: as for `simulate`. Raises SolveError.
         """
         state = self.initial_state()
-        out = np.empty((len(times), state.size))
-        progress = np.zeros(4)
+        out = np.empty((len(stretch.times), state.size))
         chosen = METHODS[self.suited_method if method == "auto" else method]
-        layout, program, limited = self.layout, self.program, self.limited
-        status = integrate(
-            chosen.addresses,
-            limits.addresses() if limited else limits.NO_LIMITS,
-            program.rates_c.address,
-            program.jacobian_c.address if chosen is IMPLICIT else 0,
-            program.reactions_c.address if limited else 0,
-            program.strike_c.address if limited else 0,
-            times[0],
-            times[-1],
-            state,
-            times,
-            out,
-            self.state_scale,
-            layout.parameters,
-            layout.index,
-            inputs,
-            context,
-            layout.joints if limited else 0,
-            self.limit_offset,
-            program.LOCKED,
-            stops,
-            tolerance,
-            LONGEST_STEP,
-            progress,
-        )
+        data = self.new_data(0.0, stretch.period)
+        problem = self.problem(data, jacobian=chosen.implicit)
+        give_inputs(problem, stretch.inputs)
+        control = new_record(CONTROL)
+        control.start, control.end = stretch.times[0], stretch.times[-1]
+        control.tolerance, control.longest = tolerance, LONGEST_STEP
+        how = chosen.limited if self.limited else chosen.free
+        status = integrate(how, problem, control, stretch.stops, self.state_scale, state, stretch.times, out)
         if status != DONE:
-            raise SolveError(f"{self.limb.file}: the solution stops at {progress[2]:.6g} s: {FAILURES[status]}")
-        return out, (int(progress[0]), int(progress[1]))
-
-    def accelerations(
-        self, times: FloatArray, states: FloatArray, inputs: FloatArray, context: FloatArray, out: FloatArray
-    ) -> None:
-        """Fill in joint accelerations out [T, n] of solved states."""
-        layout, n = self.layout, self.layout.joints
-        limits = layout.parameters[self.limit_offset : self.limit_offset + 2 * n]
-        self.program.accelerations(
-            times, states, layout.parameters, layout.index, inputs, context, limits[:n], limits[n:], out
-        )
+            raise SolveError(f"{self.limb.file}: the solution stops at {control.time:.6g} s: {FAILURES[status]}")
+        return out, (int(control.steps), int(control.rejected))
 
 
 def prepared(samples: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:

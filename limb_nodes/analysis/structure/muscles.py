@@ -12,7 +12,7 @@ from limb_nodes.analysis.structure.relations import Assembly, Relation, Term, Va
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels import CONTRACTS, Equation, Law, motor_unit, muscle, sarcomere
 from limb_nodes.model import ChosenLaw, Limb, MotorUnit, Muscle
-from limb_nodes.model.layout import MUSCLE_PROCESSES, UNIT_PROCESSES
+from limb_nodes.model.kinds import MUSCLE_PROCESSES, UNIT_PROCESSES
 from limb_nodes.model.system import UNIT_INPUTS, UNIT_PARAMETERS
 
 SARCOMERE, UNIT, MUSCLE, TENDON, APONEUROSIS = "sarcomere", "motor_unit", "muscle", "tendon", "aponeurosis"
