@@ -4,47 +4,82 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.exceptions import McapError
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.bags.recover import recover
-from limb_nodes.bags.types import TOPIC_TYPES, make_message
-from limb_nodes.bags.write import BagWriter
+from limb_nodes.bags.types import RUN_INFO, TOPIC_TYPES, limb_typestore, make_message
+from limb_nodes.bags.write import BagWriter, open_writer
 from limb_nodes.errors import UserError
 
 RECORD_WITHOUT_END = """
-import sys, time
+import sys
 from limb_nodes.bags.types import TOPIC_TYPES, make_message
 from limb_nodes.bags.write import BagWriter
 
 bag = BagWriter(sys.argv[1], {"seed": 7}, flush_period=0.05)
-start, k = time.monotonic(), 0
+k = 0
 while True:
     message = make_message(TOPIC_TYPES["activation"], k, tick=k, name=["a", "b"], activation=[k * 1e-6, 0.5])
     bag.write("activation", k, message)
     k += 1
-    if k % 1000 == 0 and time.monotonic() - start > 0.5:
+    if k % 1000 == 0:
         print(k, flush=True)
 """
+# The first message of each chunk of `in_chunks`, then the number of all messages.
+CHUNKS = (0, 130, 390, 400, 730, 1000)
 
 
 @pytest.fixture(scope="module")
 def killed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int]:
-    """A bag whose recorder was killed, and the number of messages that it had written at least half a second before."""
+    """A bag whose recorder was killed, and the number of messages that could be read from the disk before."""
     path = tmp_path_factory.mktemp("killed") / "run"
     with subprocess.Popen(
         [sys.executable, "-c", RECORD_WITHOUT_END, str(path)], stdout=subprocess.PIPE, text=True
     ) as child:
         assert child.stdout is not None
-        written = int(child.stdout.readline())
-        for line in child.stdout:
-            if int(line) > 3 * written:
-                break
-        child.kill()
-    return path, written
+        try:
+            for line in child.stdout:
+                on_disk = messages_in(path / "run.mcap")
+                if on_disk > 1000:
+                    return path, on_disk
+                assert int(line) < 1_000_000, "nothing reaches the disk"
+        finally:
+            child.kill()
+    pytest.fail("the recorder ended by itself")
+
+
+def messages_in(file: Path) -> int:
+    """How many messages there are in a file that is being written."""
+    count = 0
+    with file.open("rb") as stream:
+        try:
+            for record in StreamReader(stream).records:
+                count += isinstance(record, Message)
+        except McapError:  # the end of what is there
+            return count
+    return count
+
+
+def in_chunks(path: Path) -> Path:
+    """A bag of noise with a flush after each chunk, written without a thread: its bytes are the same every time."""
+    store, noise = limb_typestore(), np.random.default_rng(1).normal(size=(CHUNKS[-1], 20))
+    bag = open_writer(path, compressed=True)
+    info, activation = (bag.add_connection(f"/{t}", TOPIC_TYPES[t], typestore=store) for t in (RUN_INFO, "activation"))
+    bag.write_all([(info, 0, store.serialize_cdr(make_message(info.msgtype, data="seed: 1\n"), info.msgtype))])
+    for first, end in pairwise(CHUNKS):
+        messages = [make_message(activation.msgtype, k, tick=k, activation=noise[k]) for k in range(first, end)]
+        bag.write_all((activation, m.tick, store.serialize_cdr(m, activation.msgtype)) for m in messages)
+        bag.flush()
+    bag.close()
+    return path / f"{path.name}.mcap"
 
 
 def test_the_reader_says_how_to_recover(killed: tuple[Path, int]) -> None:
@@ -55,12 +90,12 @@ def test_the_reader_says_how_to_recover(killed: tuple[Path, int]) -> None:
 
 
 def test_a_killed_recorder_leaves_all_but_the_last_moments(killed: tuple[Path, int], tmp_path: Path) -> None:
-    path, written = killed
+    path, on_disk = killed
     before = (path / "run.mcap").read_bytes()
     found = recover(path, tmp_path / "out")
     assert (path / "run.mcap").read_bytes() == before
     assert found.truncated
-    assert found.counts["/activation"] >= written
+    assert sum(found.counts.values()) >= on_disk
     with BagReader(tmp_path / "out") as bag:
         assert bag.run_info() == {"seed": 7}
         table = bag.table("activation")
@@ -70,11 +105,8 @@ def test_a_killed_recorder_leaves_all_but_the_last_moments(killed: tuple[Path, i
 
 
 def test_a_file_cut_anywhere_gives_the_messages_before_the_cut(tmp_path: Path) -> None:
-    with BagWriter(tmp_path / "whole", {"seed": 1}, flush_period=0.0) as bag:
-        for k in range(1000):
-            bag.write("activation", k, make_message(TOPIC_TYPES["activation"], k, tick=k, name=["a"], activation=[0.5]))
-    data = (tmp_path / "whole" / "whole.mcap").read_bytes()
-    most = -1
+    data = in_chunks(tmp_path / "whole").read_bytes()
+    counts = []
     for number, size in enumerate(np.linspace(0, len(data) - 1, 60).astype(int)):
         cut = tmp_path / f"cut{number}"
         cut.mkdir()
@@ -83,31 +115,28 @@ def test_a_file_cut_anywhere_gives_the_messages_before_the_cut(tmp_path: Path) -
             found = recover(cut, tmp_path / f"out{number}")
         except UserError as error:
             assert "nothing to recover" in str(error)
-            assert most < 0
+            assert not counts
             continue
         assert found.truncated
-        count = found.counts.get("/activation", 0)
-        assert count >= most
-        most = count
+        counts.append(found.counts["/activation"])
         with BagReader(found.path) as bag:
             assert bag.run_info() == {"seed": 1}
-            if count:
-                np.testing.assert_array_equal(bag.table("activation")["tick"], np.arange(count))
-    assert most == 1000
+            np.testing.assert_array_equal(bag.table("activation")["tick"], np.arange(counts[-1]))
+    assert counts == sorted(counts)
+    # The smallest chunk may lie between two cuts.
+    assert {*CHUNKS[1:]} - {390} <= {*counts} <= {*CHUNKS[1:]}
 
 
-def test_damage_in_the_middle_ends_the_recovery_there(tmp_path: Path) -> None:
-    noise = np.random.default_rng(1).normal(size=(1000, 100))
-    with BagWriter(tmp_path / "whole", {"seed": 1}, flush_period=0.0) as bag:
-        for k, row in enumerate(noise):
-            bag.write("activation", k, make_message(TOPIC_TYPES["activation"], k, tick=k, activation=row))
-    file = tmp_path / "whole" / "whole.mcap"
+@pytest.mark.parametrize("place", [0.3, 0.5, 0.9])
+def test_damage_in_the_middle_ends_the_recovery_there(place: float, tmp_path: Path) -> None:
+    file = in_chunks(tmp_path / "whole")
     data = bytearray(file.read_bytes())
-    data[len(data) // 2] ^= 0xFF
+    data[int(place * len(data))] ^= 0xFF
     file.write_bytes(data)
     found = recover(tmp_path / "whole", tmp_path / "out")
     assert found.truncated
-    assert 0 < found.counts["/activation"] < 1000
+    # The chunks before the damaged one, whole.
+    assert found.counts["/activation"] == max(first for first in CHUNKS if first < place * CHUNKS[-1])
     with BagReader(tmp_path / "out") as reader:
         assert reader.run_info() == {"seed": 1}
         np.testing.assert_array_equal(reader.table("activation")["tick"], np.arange(found.counts["/activation"]))
