@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from scipy.special import ellipk
 
 from limb_nodes.analysis.course import Course
 from limb_nodes.analysis.verification import CASES, balanced_angle, examine, frequency, highest_turn, lowest_turn
@@ -19,34 +18,29 @@ from limb_nodes.commands.verify import write_limb
 from limb_nodes.errors import UserError
 from limb_nodes.model import load_limb
 from limb_nodes.model.shipped import params_folder, shipped
+from tests.independent.reference_joint import (
+    ABOUT_JOINT,
+    ARM,
+    COM,
+    GRAVITY,
+    MASS,
+    START,
+    WEIGHT,
+    equilibrium,
+    pendulum,
+    rates,
+)
 
-# The reference limb, written down again: what is verified must not deliver what it is compared with.
-MASS, LENGTH, CENTRE, GRAVITY = 1.25, 0.35, 0.175, 9.81
-INERTIA = 0.0127604 + MASS * CENTRE**2
-ARM, PROXIMAL, DISTAL = 0.0215, 0.10, 0.03
-START = math.radians(30)
-WEIGHT = MASS * GRAVITY * CENTRE
-SERIES, PARALLEL = 42000, 1e14
-SHORTEST, OPTIMAL, LONGEST = 0.9 * 1.6e-6, 2 * 1.35e-6, 1.6e-6 + 2 * 1.35e-6
-ISOMETRIC = 11e-9 / 45e-9 * 4e-12
-FASTEST = 11e-9 * 230.0 * 3e-3 / (230.0 / 0.76e6 + 3e-3)
-STIFFNESS, DAMPING, SLACK = 1e5, 1e4, 0.03
 TIGHT = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-12}
-
-
-def pendulum(gravity: float, load: float = 0.0) -> float:
-    """Frequency (Hz) of the limb as a pendulum from 30 degrees, load (N) at its tip."""
-    small = math.sqrt((MASS * gravity * CENTRE + load * LENGTH) / INERTIA)
-    return small / (4.0 * float(ellipk(math.sin(START / 2) ** 2)))
 
 
 def pushed(force: float, gravity: float, until: float, event: Callable[..., float] | None = None):
     """The limb under a constant muscle force (N, negative in the extensor)."""
 
-    def rates(_, state):
-        return [state[1], (force * ARM - MASS * gravity * CENTRE * math.sin(state[0])) / INERTIA]
+    def free(_, state):
+        return [state[1], (force * ARM - MASS * gravity * COM * math.sin(state[0])) / ABOUT_JOINT]
 
-    return solve_ivp(rates, (0.0, until), [START, 0.0], events=event, **TIGHT)
+    return solve_ivp(free, (0.0, until), [START, 0.0], events=event, **TIGHT)
 
 
 def lower_turn(force: float) -> float:
@@ -70,105 +64,18 @@ def arrives(force: float, limit: float) -> float:
     return float(pushed(force, 1.1, 1.0, lambda _, state: state[0] - limit).t_events[0][0])
 
 
-def line(angle: float, role: float) -> float:
-    """Muscle-tendon length (m)."""
-    return sum(math.sqrt(ARM**2 + d**2 - role * 2 * ARM * d * math.sin(angle / 2)) for d in (PROXIMAL, DISTAL))
-
-
-def line_velocity(angle: float, velocity: float, role: float) -> float:
-    """Shortening velocity (m/s) of the muscle-tendon unit."""
-    step = 1e-5
-    return -velocity * (line(angle + step, role) - line(angle - step, role)) / (2 * step)
-
-
-def fibre(length: float, velocity: float, activation: float) -> float:
-    """Force (N) of the one motor unit."""
-    sarcomere = length / SERIES
-    short = max(0.0, (sarcomere - SHORTEST) / (OPTIMAL - SHORTEST))
-    norm = short if sarcomere < OPTIMAL else 1.0 + (sarcomere - OPTIMAL) / (LONGEST - OPTIMAL)
-    passive = 30.0 * max(0.0, (norm - 1.2) / 0.8) ** 2
-    if activation < 0.8:
-        return passive
-    low, high, here = (1.0 / (1.0 + math.exp((0.5 - x) / 0.15)) for x in (0.0, 1.0, (activation - 0.8) / 0.2))
-    factor = math.exp(-(abs((norm**2.3 - 1.0) / 1.12) ** 1.61)) * (here - low) / (high - low)
-    return ISOMETRIC * PARALLEL * factor * by_velocity(velocity / SERIES) + passive
-
-
-def by_velocity(velocity: float) -> float:
-    """Relative force of a sarcomere."""
-    norm, debye = velocity / (1.15 * FASTEST), 3.0 / 11.0
-    if norm > 1e-3:
-        back = 1.0 / math.expm1(0.15 / norm)
-        return (1.0 - math.exp(-0.15 / norm)) * (1.0 - debye * (norm / 0.15 - back) - norm)
-    if norm > 0.0:
-        return 1.0 - debye * norm / 0.15 - norm
-    return 1.0 - 0.4 * norm / (0.4 / (1.0 + debye / 0.15) - norm)
-
-
-def pull(angle: float, velocity: float, tendon: float, role: float, activation: float) -> tuple[float, float]:
-    """Force (N) of a muscle with a tendon of some length (m), and the velocity (m/s) of that tendon."""
-    strain, speed = STIFFNESS * max(0.0, tendon - SLACK), line_velocity(angle, velocity, role)
-
-    def excess(force: float) -> float:
-        return fibre(line(angle, role) - tendon, speed + (force - strain) / DAMPING, activation) - force
-
-    force = brentq(excess, -1e-6, 1e4, xtol=1e-12) if excess(0.0) > 0.0 else 0.0
-    return force, (force - strain) / DAMPING
-
-
-def rates_without_tendons(_, state):
-    angle, velocity = state
-    forces = [
-        max(0.0, fibre(line(angle, role), line_velocity(angle, velocity, role), activation))
-        for role, activation in ((1.0, 0.9), (-1.0, 0.0))
-    ]
-    return [velocity, (ARM * (forces[0] - forces[1]) - WEIGHT * math.sin(angle)) / INERTIA]
-
-
-def rates_with_tendons(_, state):
-    angle, velocity, flexor, extensor = state
-    (up, flexor_rate), (down, extensor_rate) = (
-        pull(angle, velocity, flexor, 1.0, 0.9),
-        pull(*state[:2], extensor, -1, 0),
-    )
-    return [velocity, (ARM * (up - down) - WEIGHT * math.sin(angle)) / INERTIA, flexor_rate, extensor_rate]
-
-
-def first_turn(rates: Callable[..., list[float]], start: list[float]) -> float:
-    """Angle (rad) at which the limb that falls turns first."""
-    solution = solve_ivp(rates, (0.0, 0.5), start, events=lambda _, state: state[1], rtol=1e-8, atol=1e-10)
+def first_turn(tendons: bool) -> float:
+    """Angle (rad) at which the limb that falls turns first, its flexor held at 0.9."""
+    start = [START, -2.0, *([0.05, 0.05] if tendons else [])]
+    falling = rates(lambda _: (0.9, 0.0), tendons)
+    solution = solve_ivp(falling, (0.0, 0.5), start, events=lambda _, state: state[1], rtol=1e-8, atol=1e-10)
     return float(solution.y_events[0][0][0])
-
-
-def settled_without_tendons() -> float:
-    """Angle (rad) at which muscles and weight balance."""
-    return brentq(lambda angle: rates_without_tendons(0.0, [angle, 0.0])[1], 0.0, 1.0, xtol=1e-14)
-
-
-def settled_tendon(angle: float, role: float, activation: float) -> float:
-    """Length (m) at which a tendon bears what its muscle pulls."""
-
-    def excess(tendon: float) -> float:
-        return fibre(line(angle, role) - tendon, 0.0, activation) - STIFFNESS * (tendon - SLACK)
-
-    return brentq(excess, SLACK, 0.05, xtol=1e-15) if excess(SLACK) > 0.0 else SLACK
-
-
-def settled_with_tendons() -> float:
-    """The same angle with tendons."""
-
-    def torque(angle: float) -> float:
-        stretch = settled_tendon(angle, 1.0, 0.9) - settled_tendon(angle, -1.0, 0.0)
-        return ARM * STIFFNESS * stretch - WEIGHT * math.sin(angle)
-
-    return brentq(torque, 0.0, 1.0, xtol=1e-14)
 
 
 def expected() -> dict[tuple[str, str], float]:
     """What every case must show, but for what is zero and what is set (turn at 30 degrees, limits, thresholds)."""
-    angle, lax = settled_without_tendons(), settled_with_tendons()
+    (stiff, _), (lax, (flexor, extensor)) = (equilibrium((0.9, 0.0), tendons) for tendons in (False, True))
     firing = (math.pi - 2 * math.asin(0.8)) / (2 * math.pi)
-    falling = [START, -2.0]
     up, down = pushed(50.0, 1.1, 2.0).y[:, -1], pushed(-50.0, 1.1, 2.0).y[:, -1]
     return {
         ("3.2", "frequency (Hz)"): pendulum(1.1),
@@ -189,12 +96,12 @@ def expected() -> dict[tuple[str, str], float]:
         ("3.8-range", "first instant at the limit (s)"): arrives(-50.0, -1.5),
         ("3.9", "share of time flexor fires (1)"): firing,
         ("3.9", "share of time extensor fires (1)"): firing,
-        ("3.10", "angle where it turns first (rad)"): first_turn(rates_without_tendons, falling),
-        ("3.10", "angle at the end (rad)"): angle,
-        ("3.10", "torque at the end (N m)"): WEIGHT * math.sin(angle),
-        ("3.11", "flexor tendon at the end (m)"): settled_tendon(lax, 1.0, 0.9),
-        ("3.11", "extensor tendon at the end (m)"): settled_tendon(lax, -1.0, 0.0),
-        ("3.11", "angle where it turns first (rad)"): first_turn(rates_with_tendons, [*falling, 0.05, 0.05]),
+        ("3.10", "angle where it turns first (rad)"): first_turn(tendons=False),
+        ("3.10", "angle at the end (rad)"): stiff,
+        ("3.10", "torque at the end (N m)"): WEIGHT * math.sin(stiff),
+        ("3.11", "flexor tendon at the end (m)"): flexor,
+        ("3.11", "extensor tendon at the end (m)"): extensor,
+        ("3.11", "angle where it turns first (rad)"): first_turn(tendons=True),
         ("3.11", "angle at the end (rad)"): lax,
         ("3.11", "torque at the end (N m)"): WEIGHT * math.sin(lax),
     }

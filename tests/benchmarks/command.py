@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from benchmarks import ensembles, graph, solving, starting
-from benchmarks.table import Row, as_json, as_table
+from tests.benchmarks import ensembles, graph, solving, starting
+from tests.benchmarks.table import Row, as_json, as_table
 
 Part = Callable[[int, float], Iterator[Row]]
 PARTS: dict[str, Part] = {

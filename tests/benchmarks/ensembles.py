@@ -7,15 +7,15 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks import works
-from benchmarks.peers import mujoco_limb
-from benchmarks.solving import PRODUCT, loosest, missing, product
-from benchmarks.table import Bar, Row
-from benchmarks.timing import alternate, median, ratio, timed
-from benchmarks.works import RATE, Work
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import with_values
 from limb_nodes.solve.ensemble import cores, simulate_ensemble
+from tests.benchmarks import works
+from tests.benchmarks.peers import mujoco_limb
+from tests.benchmarks.solving import PRODUCT, loosest, missing, product
+from tests.benchmarks.table import Bar, Row
+from tests.benchmarks.timing import alternate, median, ratio, timed
+from tests.benchmarks.works import RATE, Work
 
 OUTPUTS = 100
 

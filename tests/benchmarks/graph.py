@@ -6,11 +6,11 @@ import os
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from benchmarks.ring import Ring, in_one_process, in_three_processes, recorded
-from benchmarks.solving import PRODUCT, missing
-from benchmarks.table import Bar, Row
-from benchmarks.timing import Spent, alternate, median, ratio
 from limb_nodes.model.shipped import shipped
+from tests.benchmarks.ring import Ring, in_one_process, in_three_processes, recorded
+from tests.benchmarks.solving import PRODUCT, missing
+from tests.benchmarks.table import Bar, Row
+from tests.benchmarks.timing import Spent, alternate, median, ratio
 
 BARE = "bare rclpy ring"
 

@@ -1,6 +1,6 @@
 """Rings of three nodes in lockstep, bare or the product's, in one process or each node in its own.
 
-Run as a script it is one node of a ring in its own process.
+Run as a module it is one node of a ring in its own process.
 """
 
 from __future__ import annotations
@@ -18,15 +18,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-if __name__ == "__main__":
-    sys.path[:1] = [str(Path(__file__).resolve().parents[2]), str(Path(__file__).resolve().parents[1])]
-
-from benchmarks.timing import Spent
+from tests.benchmarks.timing import Spent
 
 NODES = ("activation_input", "muscle_stack", "limb_dynamics")
 STATES = ("muscle_state", "motor_unit_state", "sarcomere_state")
 # Ticks before the clock starts: discovery and the first calls are no part of the rate.
 WARM = 20
+ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 120.0
 
 
@@ -43,8 +41,8 @@ def bare_node(ring: Ring, name: str, context: Any) -> Any:
     """A node that only passes messages on."""
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-    from benchmarks.peers.bare_ring import BARE
     from limb_nodes.model import load_limb
+    from tests.benchmarks.peers.bare_ring import BARE
 
     qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     limb = load_limb(ring.limb)
@@ -131,10 +129,9 @@ def in_three_processes(ring: Ring) -> Spent:
     children = []
     try:
         for name in NODES:
-            command = [sys.executable, str(Path(__file__)), json.dumps({**asdict(ring), "node": name})]
-            children.append(
-                subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ)
-            )
+            command = [sys.executable, "-m", "tests.benchmarks.ring", json.dumps({**asdict(ring), "node": name})]
+            pipe = subprocess.PIPE
+            children.append(subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=os.environ, cwd=ROOT))
         answers = []
         for child in children:
             out, complaint = child.communicate(timeout=PATIENCE)

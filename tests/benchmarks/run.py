@@ -8,6 +8,5 @@ import sys
 from pathlib import Path
 
 if __name__ == "__main__":
-    here = Path(__file__).resolve()
-    sys.path[:1] = [str(here.parents[2]), str(here.parents[1])]
-    runpy.run_module("benchmarks.command", run_name="__main__", alter_sys=True)
+    sys.path[0] = str(Path(__file__).resolve().parents[2])
+    runpy.run_module("tests.benchmarks.command", run_name="__main__", alter_sys=True)

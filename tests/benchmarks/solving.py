@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import works
-from benchmarks.peers import mujoco_limb, opensim_arm, plain_python, scipy_lsoda, sundials_cvode
-from benchmarks.table import Bar, Row
-from benchmarks.timing import Spent, alternate, median, ratio, timed
-from benchmarks.works import RATE, WANTED, Work
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.solve.pieces import pieces
+from tests.benchmarks import works
+from tests.benchmarks.peers import mujoco_limb, opensim_arm, plain_python, scipy_lsoda, sundials_cvode
+from tests.benchmarks.table import Bar, Row
+from tests.benchmarks.timing import Spent, alternate, median, ratio, timed
+from tests.benchmarks.works import RATE, WANTED, Work
 
 PRODUCT = "limb_nodes"
 Solve = Callable[[float], FloatArray]
@@ -63,7 +63,7 @@ def lsoda(work: Work) -> Solve:
     """Angles by LSODA with plain Python, the input prepared beforehand."""
     model = work.model
     inputs = pieces(model.drives(work.excitation))
-    rates = plain_python.right_hand_side(model, inputs, 1.0 / RATE)
+    rates = plain_python.right_hand_side(inputs, 1.0 / RATE)
     apart = plain_python.largest_difference(model, rates, inputs, 1.0 / RATE)
     if apart > 1e-9:
         raise RuntimeError(f"the plain equations are not those of the program: {apart:.1e}")

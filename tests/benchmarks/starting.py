@@ -11,10 +11,10 @@ from pathlib import Path
 from ruamel.yaml import YAML
 
 import limb_nodes
-from benchmarks.solving import PRODUCT
-from benchmarks.table import Bar, Row
-from benchmarks.timing import Spent, median, timed_process
 from limb_nodes.model.shipped import shipped
+from tests.benchmarks.solving import PRODUCT
+from tests.benchmarks.table import Bar, Row
+from tests.benchmarks.timing import Spent, median, timed_process
 
 LIMIT = {"cold": 15.0, "warm": 1.5, "a law exchanged, first": None, "a law exchanged, second": 2.0}
 

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from limb_nodes.levels.limb import chain
+from tests.independent.chain import points
 
 GRAVITY = np.array([1.5, -9.81])
 TIP_FORCE = np.array([20.0, -35.0])
@@ -28,16 +29,14 @@ class Chain:
         self.angle, self.velocity = rng.uniform(-4, 4, n), rng.uniform(-6, 6, n)
 
     def points(self, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Centres of mass [n, 2] and the tip [2]."""
-        along = np.column_stack([np.cos(angle), np.sin(angle)])
-        ends = np.cumsum(self.length[:, None] * along, axis=0)
-        return ends - (self.length - self.com)[:, None] * along, ends[-1]
+        """Centres of mass [n, 2] and the tip [2] at segment angles [n]."""
+        return points(self.length, self.com, np.column_stack([np.cos(angle), np.sin(angle)]))
 
     def jacobians(self) -> tuple[np.ndarray, np.ndarray]:
         """Slopes of the points in the segment angles by complex step: [n, 2, n] and [2, n]."""
         turned = [self.points(self.angle + 1e-30j * np.eye(self.n)[k]) for k in range(self.n)]
         return (
-            np.stack([points.imag / 1e-30 for points, _ in turned], axis=-1),
+            np.stack([centres.imag / 1e-30 for centres, _ in turned], axis=-1),
             np.stack([tip.imag / 1e-30 for _, tip in turned], axis=-1),
         )
 
@@ -62,8 +61,8 @@ chains = st.builds(Chain, st.integers(1, 6), st.integers(0, 10**6))
 @given(chains)
 def test_inertia_is_that_of_the_kinetic_energy(made):
     """Twice the kinetic energy: sum of m v^2 + theta omega^2."""
-    points, _ = made.jacobians()
-    expected = np.einsum("k,kxi,kxj->ij", made.mass, points, points) + np.diag(made.inertia)
+    centres, _ = made.jacobians()
+    expected = np.einsum("k,kxi,kxj->ij", made.mass, centres, centres) + np.diag(made.inertia)
     np.testing.assert_allclose(made.matrix(), expected, rtol=1e-9, atol=1e-12)
 
 
@@ -76,8 +75,8 @@ def test_inertia_is_symmetric_and_positive_definite(made):
 
 @given(chains)
 def test_gravity_and_tip_force_are_the_slopes_of_their_work(made):
-    points, tip = made.jacobians()
-    weight = np.einsum("k,kxi,x->i", made.mass, points, GRAVITY)
+    centres, tip = made.jacobians()
+    weight = np.einsum("k,kxi,x->i", made.mass, centres, GRAVITY)
     load = TIP_FORCE @ tip
     distal = made.distal()
     for k in range(made.n):
@@ -90,11 +89,11 @@ def test_gravity_and_tip_force_are_the_slopes_of_their_work(made):
 @given(chains)
 def test_centrifugal_torque_is_minus_the_curved_path_of_the_centres(made):
     """- J^T m (dJ/dt) omega: the centres' acceleration when no segment turns faster."""
-    points, _ = made.jacobians()
-    along = np.column_stack([np.cos(made.angle), np.sin(made.angle)]) * (made.velocity**2)[:, None]
-    ends = np.cumsum(made.length[:, None] * along, axis=0)
-    inwards = -(ends - (made.length - made.com)[:, None] * along)
-    expected = -np.einsum("k,kxi,kx->i", made.mass, points, inwards)
+    centres, _ = made.jacobians()
+    inwards, _ = points(
+        made.length, made.com, -np.column_stack([np.cos(made.angle), np.sin(made.angle)]) * made.velocity[:, None] ** 2
+    )
+    expected = -np.einsum("k,kxi,kx->i", made.mass, centres, inwards)
     distal = made.distal()
     for k in range(made.n):
         found = 0.0

@@ -9,6 +9,7 @@ import pytest
 from limb_nodes.levels.limb import chain, original, transformed
 from limb_nodes.model import load_limb, with_values
 from limb_nodes.solve.whole import WholeModel
+from tests.independent.chain import points
 
 LEG = Path(__file__).parents[2] / "params" / "pennate_leg.yaml"
 RATE = 2000.0
@@ -48,16 +49,11 @@ def positions(limb, angles):
 
 def com_accelerations(limb, angles, velocities, accelerations):
     """2.65 differentiated twice, in closed form [T, 3, 2]."""
-    found = np.empty((*angles.shape, 2))
     sine, cosine = np.sin(angles), np.cos(angles)
     x = -sine * accelerations - cosine * velocities**2
     y = cosine * accelerations - sine * velocities**2
-    origin = np.zeros((len(angles), 2))
-    for k, segment in enumerate(limb.segments):
-        push = np.stack([x[:, k], y[:, k]], axis=1)
-        found[:, k] = origin + segment.com_distance * push
-        origin = origin + segment.length * push
-    return found
+    length, com = (np.array([getattr(segment, key) for segment in limb.segments]) for key in ("length", "com_distance"))
+    return points(length, com, np.stack([x, y], axis=-1))[0]
 
 
 def joint_forces(limb, accelerations):

@@ -1,6 +1,6 @@
 """The reference joint of the report's section 3.3: figures 3.2 to 3.11, by number.
 
-What must come out is found here a second time, from model equations written down anew.
+What must come out follows from mechanics, or from the model as `tests.independent` writes it down anew.
 """
 
 import math
@@ -10,17 +10,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from scipy.special import ellipk
 
 from limb_nodes.model import load_limb, with_values
 from limb_nodes.solve.whole import WholeModel
+from tests.independent.reference_joint import ABOUT_JOINT, ARM, COM, MASS, START, WEIGHT, equilibrium, pendulum, rates
 
 PARAMS = Path(__file__).parents[2] / "params"
-START = math.pi / 6
-MASS, LENGTH, COM, INERTIA = 1.25, 0.35, 0.175, 0.0127604
-ABOUT_JOINT = INERTIA + MASS * COM**2
-ARM, PROXIMAL, DISTAL = 0.0215, 0.10, 0.03
-STIFFNESS, DAMPING, TENDON_SLACK = 1e5, 1e4, 0.03
 RATE = 1000.0
 
 
@@ -44,11 +39,6 @@ def frequency(time: np.ndarray, angle: np.ndarray) -> float:
     return (len(zeros) - 1) / (zeros[-1] - zeros[0])
 
 
-def pendulum(torque_amplitude: float) -> float:
-    """Frequency of a pendulum from 30 degrees, by its elliptic integral."""
-    return math.sqrt(torque_amplitude / ABOUT_JOINT) / (4 * ellipk(math.sin(START / 2) ** 2))
-
-
 class TestPendulum:
     """No muscle force: `muscles` empty."""
 
@@ -62,7 +52,7 @@ class TestPendulum:
         found = simulate(given, [], 30.0 if gravity < 2 else 10.0)
         measured = frequency(found.time, found.angle[:, 0])
         assert measured == pytest.approx(expected, rel=0.005)
-        assert measured == pytest.approx(pendulum(MASS * gravity * COM + load * LENGTH), rel=1e-4)
+        assert measured == pytest.approx(pendulum(gravity, load), rel=1e-4)
         # It swings about zero and back to where it started.
         assert found.angle.max() == pytest.approx(START, abs=1e-6)
         assert found.angle.min() == pytest.approx(-START, abs=1e-4)
@@ -83,14 +73,14 @@ class TestConstantForce:
         names = {"flexor": 10.0 if side > 0 else 0.0, "extensor": 0.0 if side > 0 else 10.0}
         found = simulate(constant_force(names), [1.0, 1.0], 10.0)
         angle = found.angle[:, 0]
-        rest = side * math.asin(10 * ARM / (MASS * 9.81 * COM))
+        rest = side * math.asin(10 * ARM / WEIGHT)
         assert rest == pytest.approx(side * 0.1, abs=0.002)
         # The turning points have the same energy: m g l cos(angle) + M angle.
-        level = MASS * 9.81 * COM * math.cos(START) + side * 10 * ARM * START
+        level = WEIGHT * math.cos(START) + side * 10 * ARM * START
         turn = (
-            brentq(lambda a: MASS * 9.81 * COM * math.cos(a) + side * 10 * ARM * a - level, rest - 1.0 * side, rest)
+            brentq(lambda a: WEIGHT * math.cos(a) + side * 10 * ARM * a - level, rest - 1.0 * side, rest)
             if side > 0
-            else brentq(lambda a: MASS * 9.81 * COM * math.cos(a) - 10 * ARM * a - level, -1.5, rest)
+            else brentq(lambda a: WEIGHT * math.cos(a) - 10 * ARM * a - level, -1.5, rest)
         )
         assert angle.max() == pytest.approx(START, abs=1e-6)
         assert angle.min() == pytest.approx(turn, abs=1e-4)
@@ -124,105 +114,6 @@ class TestConstantForce:
         assert np.abs(free.angle[first, 0]) >= 1.2 - 1e-9
 
 
-# The model once more, from its page: one segment, a flexor and an extensor of one slow unit each.
-
-
-def force_velocity(v: float) -> float:
-    """F_S/F_S_max at a sarcomere's shortening velocity (m/s)."""
-    k_m = 230.0 / 0.76e6
-    v_max = 11e-9 * 230.0 * 3e-3 / (k_m + 3e-3)
-    x, elasticity = v / (1.15 * v_max), 3 / 11
-    if x > 1e-4:
-        return -math.expm1(-0.15 / x) * (1 - elasticity * (x / 0.15 - 1 / math.expm1(min(0.15 / x, 700))) - x)
-    if x > 0:
-        return 1 - elasticity * x / 0.15 - x
-    c = 0.4 / (1 + elasticity / 0.15)
-    return 1 + 0.4 * -x / (-x + c)
-
-
-def unit_force(length: float, velocity: float, activation: float) -> float:
-    """Force (N) of the unit at fibre length (m), shortening velocity (m/s) and activation."""
-    shortest, optimal, longest = 42000 * 1.44e-6, 42000 * 2.7e-6, 42000 * 4.3e-6
-    norm = (
-        (length - shortest) / (optimal - shortest) if length < optimal else 1 + (length - optimal) / (longest - optimal)
-    )
-    active = 0.0
-    if activation >= 0.8:
-        f = (activation - 0.8) / 0.2
-
-        def logistic(x):
-            return 1 / (1 + math.exp(-(x - 0.5) / 0.15))
-
-        ff = (logistic(f) - logistic(0)) / (logistic(1) - logistic(0))
-        fl = math.exp(-(abs((max(0.0, norm) ** 2.3 - 1) / 1.12) ** 1.61))
-        active = 11 / 45 * 4e-12 * 1e14 * force_velocity(velocity / 42000) * fl * ff
-    return active + 30 * (max(0.0, norm - 1.2) / 0.8) ** 2
-
-
-def path(angle: float, role: float) -> tuple[float, float]:
-    """Muscle-tendon length and its slope in the angle."""
-    total = slope = 0.0
-    for d in (PROXIMAL, DISTAL):
-        part = math.sqrt(ARM**2 + d**2 - role * 2 * ARM * d * math.sin(angle / 2))
-        total += part
-        slope -= role * ARM * d * math.cos(angle / 2) / (2 * part)
-    return total, slope
-
-
-def muscle_force(angle, velocity, role, activation, tendon=None) -> float:
-    """Force (N) of a muscle; with a tendon of this length the loop is closed by bracketing."""
-    length, slope = path(angle, role)
-    shortening = -slope * velocity
-    if tendon is None:
-        return max(0.0, unit_force(length, shortening, activation))
-
-    def miss(force):
-        lengthening = (max(0.0, force) - STIFFNESS * max(0.0, tendon - TENDON_SLACK)) / DAMPING
-        return unit_force(length - tendon, shortening + lengthening, activation) - force
-
-    return max(0.0, brentq(miss, -500.0, 1000.0, xtol=1e-12, rtol=1e-14))
-
-
-def rates(excitation, tendons: bool):
-    def rhs(t, y):
-        drive = [e(t) if callable(e) else e for e in excitation]
-        torque, lengthening = -MASS * 9.81 * COM * math.sin(y[0]), []
-        for i, role in enumerate((1.0, -1.0)):
-            force = muscle_force(y[0], y[1], role, drive[i], y[2 + i] if tendons else None)
-            torque += role * force * ARM
-            if tendons:
-                lengthening.append((force - STIFFNESS * max(0.0, y[2 + i] - TENDON_SLACK)) / DAMPING)
-        return [y[1], torque / ABOUT_JOINT, *lengthening]
-
-    return rhs
-
-
-def equilibrium(tendons: bool) -> tuple[float, float, list[float]]:
-    """Angle, torque of both muscles and tendon lengths at rest with U = 0.9 and 0."""
-
-    def forces(angle):
-        found = []
-        for role, activation in ((1.0, 0.9), (-1.0, 0.0)):
-            length = path(angle, role)[0]
-            if tendons:
-
-                def stretched(force, length=length, activation=activation):
-                    return unit_force(length - TENDON_SLACK - force / STIFFNESS, 0.0, activation) - force
-
-                found.append(brentq(stretched, 0.0, 500.0, xtol=1e-12))
-            else:
-                found.append(unit_force(length, 0.0, activation))
-        return found
-
-    def net(angle):
-        flexor, extensor = forces(angle)
-        return (flexor - extensor) * ARM - MASS * 9.81 * COM * math.sin(angle)
-
-    angle = brentq(net, 0.0, 1.0, xtol=1e-13)
-    flexor, extensor = forces(angle)
-    return angle, (flexor - extensor) * ARM, [TENDON_SLACK + force / STIFFNESS for force in (flexor, extensor)]
-
-
 def sine(t):
     return np.maximum(0.0, np.sin(2 * np.pi * t))
 
@@ -248,10 +139,9 @@ def test_fig_3_9_movement_is_that_of_the_equations_written_anew():
     found = simulate(limb("reference_joint"), [sine, cosine], duration, rate)
     time = found.time
     # The drives are linear between samples; here the activation is, which differs by the sigmoid's bend over 1 ms.
-    signals = [lambda t: np.interp(t, time, sine(time)), lambda t: np.interp(t, time, cosine(time))]
-    expected = solve_ivp(
-        rates(signals, False), (0, duration), [START, 0.0], t_eval=time, rtol=1e-9, atol=1e-11, max_step=2e-3
-    )
+    signals = sine(time), cosine(time)
+    anew = rates(lambda t: [np.interp(t, time, signal) for signal in signals])
+    expected = solve_ivp(anew, (0, duration), [START, 0.0], t_eval=time, rtol=1e-9, atol=1e-11, max_step=2e-3)
     np.testing.assert_allclose(found.angle[:, 0], expected.y[0], atol=2e-5)
 
 
@@ -271,7 +161,8 @@ class TestHeldFlexor:
 
     def test_settles_where_the_flexor_holds_the_weight(self, tendons, angle, torque):
         found = self.found(tendons, 60.0)
-        expected, moment, tendon = equilibrium(tendons)
+        expected, tendon = equilibrium((0.9, 0.0), tendons)
+        moment = WEIGHT * math.sin(expected)
         assert expected == pytest.approx(angle, abs=1e-4)
         assert moment == pytest.approx(torque, abs=5e-4)
         # It falls, turns and settles.
@@ -288,9 +179,8 @@ class TestHeldFlexor:
     def test_moves_as_the_equations_written_anew(self, tendons, angle, torque):
         found = self.found(tendons, 1.0)
         start = [START, -2.0, *([0.05, 0.05] if tendons else [])]
-        expected = solve_ivp(
-            rates([0.9, 0.0], tendons), (0, 1.0), start, t_eval=found.time, rtol=1e-9, atol=1e-12, max_step=5e-3
-        )
+        anew = rates(lambda _: (0.9, 0.0), tendons)
+        expected = solve_ivp(anew, (0, 1.0), start, t_eval=found.time, rtol=1e-9, atol=1e-12, max_step=5e-3)
         np.testing.assert_allclose(found.angle[:, 0], expected.y[0], atol=1e-6)
         np.testing.assert_allclose(found.velocity[:, 0], expected.y[1], atol=1e-5)
         if tendons:

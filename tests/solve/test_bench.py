@@ -8,38 +8,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from limb_nodes.bags.length_course import read_length_course
 from limb_nodes.cli import main
 from limb_nodes.errors import UserError
-from limb_nodes.levels.motor_unit.force_length import cheng
-from limb_nodes.levels.sarcomere import derenyi_vicsek as dv
 from limb_nodes.model import load_limb, with_values
 from limb_nodes.solve.bench import Course, MuscleBench, isokinetic, isometric, ramp
+from tests.independent.reference_joint import (
+    DAMPING,
+    FASTEST,
+    OPTIMAL,
+    SERIES,
+    STRONGEST,
+    fibre_force,
+    force_on_tendon,
+    settled_tendon,
+    tension,
+)
 
 PARAMS = Path(__file__).parents[2] / "params"
 RIGID, ELASTIC = PARAMS / "reference_joint.yaml", PARAMS / "reference_joint_tendon.yaml"
-
-# The reference limb: N_s 42000, N_p 1e14, psoas; fully excited, so that FF = 1.
-SERIES, PARALLEL = 42000, 1e14
-STRONGEST = PARALLEL * 11 / 45 * 4e-12
-FASTEST = 11e-9 * 230 * 3e-3 / (230 / 0.76e6 + 3e-3)
-OPTIMAL, LONGEST, SHORTEST = SERIES * 2.7e-6, SERIES * 4.3e-6, SERIES * 1.44e-6
-
-
-def norm(length: float) -> float:
-    """2.20."""
-    if length <= OPTIMAL:
-        return max(0.0, (length - SHORTEST) / (OPTIMAL - SHORTEST))
-    return 1.0 + (length - OPTIMAL) / (LONGEST - OPTIMAL)
-
-
-def fibre_force(length: float, velocity: float) -> float:
-    """2.25 with FF = 1."""
-    relative = velocity / SERIES / (1.15 * FASTEST)
-    active = dv.sarcomere_force(relative, STRONGEST, 3e-9, 11e-9, 1.4) * cheng(norm(length), 1.12, 2.3, 1.61)
-    return active + 30.0 * (max(0.0, norm(length) - 1.2) / 0.8) ** 2
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +50,7 @@ class TestIsometric:
     def test_plateau(self, rigid, part):
         """F_max FL, and the passive force where the fibre is long."""
         length = part * OPTIMAL
-        assert steady(rigid, length) == pytest.approx(fibre_force(length, 0.0), rel=1e-12)
+        assert steady(rigid, length) == pytest.approx(fibre_force(length, 0.0, 1.0), rel=1e-12)
 
     def test_optimum(self, rigid):
         """Nothing but N_p F_S_max: 97.778 N."""
@@ -72,8 +60,7 @@ class TestIsometric:
     def test_with_tendon(self, elastic, part):
         """Force of the fibre = force of the tendon, 1e5 N/m beyond 0.03 m."""
         length = part * OPTIMAL + 0.03
-        stretch = brentq(lambda s: fibre_force(length - 0.03 - s, 0.0) - 1e5 * s, 0.0, 0.01, xtol=1e-16)
-        assert steady(elastic, length) == pytest.approx(1e5 * stretch, rel=1e-9)
+        assert steady(elastic, length) == pytest.approx(tension(settled_tendon(length, 1.0)), rel=1e-9)
 
     def test_settles_at_what_steady_gives(self, elastic):
         """Switched on at rest, the muscle ends where the steady start begins: 200 ms is the slowest time constant."""
@@ -109,7 +96,7 @@ class TestIsokinetic:
         middle = int(np.abs(time - 0.05).argmin())
         assert record.fibre_length[middle] == pytest.approx(OPTIMAL, rel=1e-12)
         assert record.muscle["fibre_velocity"][middle] == pytest.approx(speed, rel=1e-9)
-        assert record.force[middle] == pytest.approx(fibre_force(OPTIMAL, speed), rel=1e-9)
+        assert record.force[middle] == pytest.approx(fibre_force(OPTIMAL, speed, 1.0), rel=1e-9)
         # 0.1 V_max leaves 0.669, as the model's page has it; 0.5 leaves 0.1274.
         known = {0.5: 0.1274, -0.1: 1.152}
         if relative in known:
@@ -128,16 +115,11 @@ class TestRamp:
     def second_model(self, lengths, times: np.ndarray, start: float) -> np.ndarray:
         """Force of fibre and Voigt tendon in series, by scipy; the piecewise motion one piece at a time."""
 
-        def rate(time: float, tendon: float, slope: float, at: float, begin: float) -> float:
-            length = begin + slope * (time - at)
-            elastic = 1e5 * max(0.0, tendon - 0.03)
+        def force(time: float, tendon: float, slope: float, at: float, begin: float) -> float:
+            return force_on_tendon(begin + slope * (time - at), -slope, 1.0, tendon)
 
-            def gap(force: float) -> float:
-                return fibre_force(length - tendon, -slope + (force - elastic) / 1e4) - force
-
-            high = gap(0.0)
-            force = brentq(gap, 0.0, high + 1.0, xtol=1e-13, rtol=1e-14) if high > 0.0 else 0.0
-            return (force - elastic) / 1e4
+        def rate(time: float, tendon: float, *piece: float) -> float:
+            return (force(time, tendon, *piece) - tension(tendon)) / DAMPING
 
         forces, tendon = [], start
         for (at, begin), (until, end) in pairwise(lengths):
@@ -152,9 +134,7 @@ class TestRamp:
                 atol=1e-13,
                 dense_output=True,
             )
-            for time in wanted:
-                state = solved.sol(time)[0]
-                forces.append(1e4 * rate(time, state, slope, at, begin) + 1e5 * max(0.0, state - 0.03))
+            forces += [force(time, solved.sol(time)[0], slope, at, begin) for time in wanted]
             tendon = solved.y[0, -1]
         return np.array(forces)
 

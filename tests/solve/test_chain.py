@@ -10,6 +10,7 @@ from limb_nodes.model import parse_limb
 from limb_nodes.model.layout import build_layout
 from limb_nodes.solve import chain
 from limb_nodes.solve.whole import WholeModel
+from tests.independent.chain import points
 
 GRAVITY = (1.5, -9.81)
 TIP = (7.0, -12.0, 0.4)
@@ -137,16 +138,15 @@ def simulate(limb, duration: float, rate: float = 1000.0, **options):
 def energy(limb, angle: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     """Kinetic and potential energy [T], from positions and velocities of the centres of mass."""
     turned, speed = limb.base_angle + np.cumsum(angle, axis=1), np.cumsum(velocity, axis=1)
-    total = np.zeros(len(angle))
-    origin, moving = np.zeros((len(angle), 2)), np.zeros((len(angle), 2))
-    for k, s in enumerate(limb.segments):
-        along = np.column_stack([np.cos(turned[:, k]), np.sin(turned[:, k])])
-        across = np.column_stack([-along[:, 1], along[:, 0]]) * speed[:, k : k + 1]
-        place, fast = origin + s.com_distance * along, moving + s.com_distance * across
-        total += 0.5 * s.mass * (fast**2).sum(axis=1) + 0.5 * s.inertia * speed[:, k] ** 2
-        total -= s.mass * place @ np.array(limb.gravity)
-        origin, moving = origin + s.length * along, moving + s.length * across
-    return total
+    mass, inertia, length, com = (
+        np.array([getattr(segment, key) for segment in limb.segments])
+        for key in ("mass", "inertia", "length", "com_distance")
+    )
+    centres, _ = points(length, com, np.stack([np.cos(turned), np.sin(turned)], axis=-1))
+    moving, _ = points(length, com, speed[..., None] * np.stack([-np.sin(turned), np.cos(turned)], axis=-1))
+    return (0.5 * mass * (moving**2).sum(axis=-1) + 0.5 * inertia * speed**2 - mass * (centres @ limb.gravity)).sum(
+        axis=1
+    )
 
 
 def test_energy_of_five_free_segments_is_conserved(five):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.peers.plain_python import Rates
 from limb_nodes.foundation.arrays import FloatArray
+from tests.benchmarks.peers.plain_python import Rates
 
 NAME = "scipy LSODA, Python"
 
