@@ -1,12 +1,10 @@
 """From a recording to envelopes in a bag: the choice of channels, the options, the command."""
 
 import argparse
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from limb_nodes.bags.activation import load_activation
 from limb_nodes.bags.emg import EnvelopeOptions, envelopes
 from limb_nodes.bags.read import BagReader
 from limb_nodes.bags.recording import Recording
@@ -15,7 +13,6 @@ from limb_nodes.bags.write import BagWriter
 from limb_nodes.commands import emg
 from limb_nodes.errors import UserError
 
-SEATED = Path(__file__).parents[2] / ".." / "shared" / "data" / "emg_lower_limb" / "5Nsen.txt"
 SAMPLES = 2000
 
 
@@ -230,18 +227,3 @@ def test_bag_without_the_topic_says_what_there_is(raw_file, tmp_path):
     limb_emg(raw_file, "-o", tmp_path / "env", "--rate", 1000)
     with pytest.raises(UserError, match=r"no message on emg_raw; the bag has /emg_envelope, /reference_angle"):
         limb_emg(tmp_path / "env", "-o", tmp_path / "again")
-
-
-@pytest.mark.skipif(not SEATED.exists(), reason="recording 5Nsen.txt is not in ../shared/data")
-def test_knee_extensors_work_while_the_seated_knee_is_straight(tmp_path):
-    limb_emg(SEATED, "-o", tmp_path / "env")
-    activation = load_activation(str(tmp_path / "env"), ["RF", "VM", "BF", "ST"], 1000.0)
-    assert activation.values.shape == (13480, 4)
-    assert activation.notes == ()
-    np.testing.assert_array_equal(activation.values.max(axis=0), 1.0)
-    with BagReader(tmp_path / "env") as bag:
-        flexion = np.degrees(bag.table("reference_angle")["position"][:, 0])
-    assert flexion.min() == pytest.approx(0.9)
-    assert flexion.max() == pytest.approx(70.6)
-    straight, bent = activation.values[flexion < 15, :2], activation.values[flexion > 60, :2]
-    assert (straight.mean(axis=0) > 4 * bent.mean(axis=0)).all()

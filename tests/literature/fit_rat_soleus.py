@@ -1,6 +1,6 @@
 """The rat soleus benchmark: its trials, the errors of a limb's muscle on them, and the fit to two of them.
 
-`python tests/literature/fit_rat_soleus.py` fits trials 1 and 5, prints the errors on all three and the
+`python -m tests.literature.fit_rat_soleus` fits trials 1 and 5, prints the errors on all three and the
 values for rat_soleus.yaml.
 """
 
@@ -16,10 +16,9 @@ from scipy.optimize import least_squares
 
 from limb_nodes.model import Limb, load_limb, with_values
 from limb_nodes.solve.bench import BenchRecord, Course, MuscleBench
+from tests.recordings import recorded
 
-HERE = Path(__file__).parent
-FOLDER = HERE.parents[2] / "shared" / "data" / "rat_soleus"
-LIMB = HERE / "rat_soleus.yaml"
+LIMB = Path(__file__).with_name("rat_soleus.yaml")
 # Amplitude (m) of the displacement in each trial.
 TRIALS = {1: 0.05e-3, 3: 0.25e-3, 5: 1.0e-3}
 FITTED_TO = (1, 5)
@@ -62,7 +61,8 @@ def columns(path: Path) -> np.ndarray:
 @cache
 def trial(number: int) -> Trial:
     """A trial, its displacement a smooth curve through the samples."""
-    moved, force = columns(FOLDER / "displacement.dat"), columns(FOLDER / f"force_trial{number}.dat")
+    folder = recorded("rat_soleus")
+    moved, force = columns(folder / "displacement.dat"), columns(folder / f"force_trial{number}.dat")
     time = np.union1d(moved[:, 0], force[:, 0])
     length, rate = Course(moved[:, 0], START + TRIALS[number] * moved[:, 1], smooth=True).at(time)
     return Trial(force[:, 0], force[:, 1], time, length, rate)

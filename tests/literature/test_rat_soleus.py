@@ -1,8 +1,6 @@
 """The maximal-activation benchmark on the rat soleus."""
 
-import importlib.util
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,27 +8,11 @@ import pytest
 from limb_nodes.levels.sarcomere import derenyi_vicsek as dv
 from limb_nodes.model import load_limb, with_values
 from limb_nodes.solve.bench import MuscleBench
-
-
-def neighbour(name: str):
-    """A module of this folder."""
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+from tests.literature import fit_rat_soleus as benchmark
 
 
 @pytest.fixture(scope="module")
-def benchmark(request):
-    """Module of the benchmark; skips where the recordings are missing."""
-    module = neighbour("fit_rat_soleus")
-    if not module.FOLDER.is_dir():
-        pytest.skip("recordings of the rat soleus are not in ../shared/data")
-    return module
-
-
-@pytest.fixture(scope="module")
-def soleus(benchmark):
+def soleus():
     return load_limb(benchmark.LIMB)
 
 
@@ -40,13 +22,13 @@ def bench(soleus):
 
 
 @pytest.mark.parametrize("number", [1, 3, 5])
-def test_mean_absolute_error(benchmark, bench, number):
+def test_mean_absolute_error(bench, number):
     """At most 5 % of 1.17 N; trial 3 has not been fitted. Published, elastic tendon: 3.3 to 8.9 %."""
     assert benchmark.error(bench, number) <= 0.05
     assert benchmark.error_over_time(bench, number) <= 0.05
 
 
-def test_muscle_is_switched_on_at_the_start(benchmark, bench):
+def test_muscle_is_switched_on_at_the_start(bench):
     for number in (1, 3, 5):
         record = benchmark.run(bench, number)
         assert record.force[0] == pytest.approx(0.0, abs=1e-9)
@@ -78,7 +60,7 @@ def test_values_stay_near_the_published_fit(soleus):
     assert 0.03 < 1.276 / tendon["stiffness"] / tendon["slack_length"] < 0.07
 
 
-def test_fit_finds_its_way_back(benchmark, soleus):
+def test_fit_finds_its_way_back(soleus):
     """From values that are off by up to 20 %, a few evaluations lead back below 5 % on all three trials."""
     start = {}
     for (place, (_, low, high)), off in zip(benchmark.FREE.items(), (0.9, 1.2, 0.9, 1.2, 1.2, 1.04, 0.8), strict=True):
