@@ -26,8 +26,6 @@ FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 NAMED = re.compile(r"# (\S+\.\w+)\n")
 NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 LONGEST = 900.0
-# Domains that the other tests do not use, outside the ports that Linux gives away.
-DOMAIN = 215 + os.getpid() % 18
 
 
 @dataclass(frozen=True)
@@ -124,8 +122,6 @@ def run(command: list[str], place: Path, where: str) -> str:
         **os.environ,
         "PATH": f"{folder}{os.pathsep}{os.environ['PATH']}",
         "PYTHONPATH": str(ROOT),
-        "ROS_DOMAIN_ID": str(DOMAIN),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_LOG_DIR": str(place / ".ros"),
         "MPLBACKEND": "Agg",
     }

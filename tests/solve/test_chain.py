@@ -167,7 +167,7 @@ def test_trajectory_of_five_segments_is_that_of_mujoco(five):
         np.testing.assert_allclose(found.velocity[row], other.data.qvel, atol=1e-5)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(1, 5), st.integers(0, 10**6), st.data())
 def test_an_impact_keeps_the_momenta_of_free_joints(n, seed, data):
     """Stopped joints take up impulses; the generalised momenta of the others cannot change."""

@@ -3,6 +3,7 @@
 import math
 import os
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from limb_nodes.errors import UserError
 from limb_nodes.model import with_values
 from limb_nodes.model.layout import build_layout
-from limb_nodes.solve.ensemble import AHEAD, Solution, simulate_ensemble
+from limb_nodes.solve.ensemble import AHEAD, CHUNK, Solution, simulate_ensemble
 from limb_nodes.solve.variants import Variants
 from limb_nodes.solve.whole import WholeModel
 
@@ -224,11 +225,16 @@ def test_a_cluster_gives_the_same(ordered, cluster, limb_named):
             assert str(solution) == str(here[index])
 
 
-def test_a_cluster_works_in_its_own_processes(cluster, limb_named):
-    samples = {"segments[0].angle": np.linspace(0.2, 0.5, 120)}
+def test_a_cluster_works_in_its_own_processes(cluster, limb_named, tmp_path):
+    samples = {"segments[0].angle": np.linspace(0.2, 0.5, 6 * CHUNK)}
 
     # A function that travels by value: the tests are no module that a worker can import.
     def own(movement):
+        """The process, once two have come so far: none can do the work of both."""
+        (tmp_path / str(os.getpid())).touch()
+        end = time.monotonic() + 300.0
+        while len(list(tmp_path.iterdir())) < 2 and time.monotonic() < end:
+            time.sleep(0.01)
         return os.getpid()
 
     results = simulate_ensemble(limb_named(NAME), samples, EXCITATION, RATE, client=cluster, function=own)
