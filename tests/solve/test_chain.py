@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limb_nodes.model import parse_limb
-from limb_nodes.model.layout import build_layout
+from limb_nodes.model.chain import chain_block
 from limb_nodes.solve import chain
 from limb_nodes.solve.whole import WholeModel
 from tests.independent.chain import points
@@ -100,14 +100,11 @@ class Mujoco:
         return full
 
 
-def scratch(n: int) -> np.ndarray:
-    return np.zeros(n * n + 7 * n)
-
-
 def joint_matrix(limb, angle: np.ndarray) -> np.ndarray:
-    n, w = len(angle), scratch(len(angle))
-    chain.joint_equations(n, build_layout(limb).parameters, angle, np.zeros(n), 0.0, 0.0, 0.0, w)
-    return w[: n * n].reshape(n, n).copy()
+    n = len(angle)
+    scratch = np.zeros(chain.scratch_size(n))
+    chain.joint_equations(chain_block(limb), np.zeros(3), angle, np.zeros(n), scratch)
+    return scratch[: n * n].reshape(n, n).copy()
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
@@ -115,11 +112,11 @@ def test_accelerations_are_those_of_mujoco(n):
     rng = np.random.default_rng(n)
     limb = limb_of(n, seed=n, tip=TIP)
     other = Mujoco(limb)
-    numbers = build_layout(limb).parameters
+    block, load, scratch = chain_block(limb), np.array(TIP), np.zeros(chain.scratch_size(n))
     for _ in range(20):
         angle, velocity, torque = rng.uniform(-3, 3, n), rng.uniform(-8, 8, n), rng.uniform(-20, 20, n)
         found = np.empty(n)
-        chain.acceleration(n, numbers, angle, velocity, torque, *TIP, np.zeros(n), found, scratch(n))
+        chain.acceleration(block, load, angle, velocity, torque, np.zeros(n), found, scratch)
         other.set(angle, velocity)
         np.testing.assert_allclose(found, other.acceleration(torque), rtol=1e-8, atol=1e-7)
         np.testing.assert_allclose(joint_matrix(limb, angle), other.matrix(), rtol=1e-9, atol=1e-12)
@@ -179,7 +176,7 @@ def test_an_impact_keeps_the_momenta_of_free_joints(n, seed, data):
     other.set(angle, velocity)
     matrix = other.matrix()
     after = velocity.copy()
-    chain.impact(n, build_layout(limb).parameters, angle, after, locked, scratch(n))
+    chain.impact(chain_block(limb), np.zeros(3), angle, after, locked, np.zeros(chain.scratch_size(n)))
     free = locked == 0.0
     np.testing.assert_array_equal(after[~free], 0.0)
     np.testing.assert_allclose((matrix @ after)[free], (matrix @ velocity)[free], rtol=1e-9, atol=1e-10)

@@ -61,7 +61,7 @@ def test_a_variant_has_the_numbers_of_a_limb_that_is_built_anew(values, limb_nam
         model = variants.model(values)
         built = build_layout(with_values(limb, values))
         assert model.program is variants.base.program
-        np.testing.assert_array_equal(model.layout.parameters, built.parameters)
+        assert model.layout.model.tobytes() == built.model.tobytes()
         np.testing.assert_array_equal(model.layout.initial_states, built.initial_states)
 
 
@@ -70,7 +70,7 @@ def test_a_sample_may_have_another_structure(limb_named):
     variants = Variants(limb)
     model = variants.model(OTHER)
     assert model.layout.units == 3
-    np.testing.assert_array_equal(model.layout.parameters, build_layout(with_values(limb, OTHER)).parameters)
+    assert model.layout.model.tobytes() == build_layout(with_values(limb, OTHER)).model.tobytes()
 
 
 def test_arrays_give_the_same_as_mappings(limb_named):
@@ -192,7 +192,7 @@ def test_numbers_that_units_share_reach_their_group(limb_named):
     limb = limb_named("arm")
     values = {"unit_kinds.slow.force_length.rho": 1.7}
     model = Variants(limb).model(values)
-    np.testing.assert_array_equal(model.layout.parameters, build_layout(with_values(limb, values)).parameters)
+    assert model.layout.model.tobytes() == build_layout(with_values(limb, values)).model.tobytes()
 
 
 @pytest.fixture(scope="module")

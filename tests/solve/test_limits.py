@@ -56,13 +56,7 @@ class TestLimit:
     def test_instant_of_the_impact(self, found, model_named):
         """By scipy's event location, on the free limb."""
         model = model_named("reference_joint")
-        layout, program = model.layout, model.program
-        u, c = pieces(model.drives(np.full((2, 2), [1.0, 0.0]))), model.context(0.0, 1.0)
-
-        def rates(t, y):
-            out = np.empty(2)
-            program.rates(t, np.ascontiguousarray(y), layout.parameters, layout.index, u, c, out)
-            return out
+        rates = model.right_hand_side(pieces(model.drives(np.full((2, 2), [1.0, 0.0]))), 1.0)
 
         def touch(t, y):
             return y[0] - 0.6
@@ -83,13 +77,7 @@ class TestLimit:
         held = {"segments[0].range": [-2.0, 0.6], "segments[0].angle": 0.6}
         found = model_named("reference_joint", held).simulate(excitation, RATE, method=method, tolerance=1e-11)
         model = model_named("reference_joint")
-        layout, program = model.layout, model.program
-        u, c = pieces(model.drives(excitation)), model.context(0.0, 1.0 / RATE)
-
-        def rates(t, y):
-            out = np.empty(2)
-            program.rates(t, np.ascontiguousarray(y), layout.parameters, layout.index, u, c, out)
-            return out
+        rates = model.right_hand_side(pieces(model.drives(excitation)), 1.0 / RATE)
 
         instant = brentq(lambda t: rates(t, np.array([0.6, 0.0]))[1], 0.01, 0.99, xtol=1e-13)
         last = int(instant * RATE)

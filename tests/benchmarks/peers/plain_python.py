@@ -33,12 +33,10 @@ def right_hand_side(inputs: FloatArray, period: float) -> Rates:
 def largest_difference(model: WholeModel, rates: Rates, inputs: FloatArray, period: float) -> float:
     """How far the plain rates are from the compiled ones at some states, relative to their size."""
     worst = 0.0
-    out = np.empty(2)
-    layout = model.layout
+    compiled = model.right_hand_side(inputs, period)
     for row in range(0, len(inputs), max(1, len(inputs) // 50)):
         state = np.array([0.5 + 0.3 * np.sin(row), 2.0 * np.cos(row)])
-        context = model.context(0.0, period)
-        model.program.rates(row * period, state, layout.parameters, layout.index, inputs, context, out)
+        out = compiled(row * period, state)
         plain = np.array(rates(row * period, state.tolist()))
         worst = max(worst, float(np.abs(plain - out).max() / max(1.0, np.abs(out).max())))
     return worst

@@ -18,11 +18,10 @@ def solve(
     """States [T, states] at some times. method: "BDF" or "Adams"."""
     from sksundae.cvode import CVODE
 
-    layout, rates, context = model.layout, model.program.rates, model.context(0.0, period)
-    parameters, index = layout.parameters, layout.index
+    rates, numbers, data = model.program.rates, model.layout.model, model.new_data(0.0, period)
 
     def right_hand_side(t: float, y: FloatArray, out: FloatArray) -> None:
-        rates(t, y, parameters, index, inputs, context, out)
+        rates(t, y, inputs, numbers, data, out)
 
     solver: Any = CVODE(
         right_hand_side,
