@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import Any
 
 from limb_nodes import cli, commands
-from limb_nodes.bags.waveform import WAVES
 from limb_nodes.levels import CONTRACTS, REGISTRY, Law, Parameter, motor_unit, sarcomere
 from limb_nodes.model import load
+from limb_nodes.signals.waveform import WAVES
 
 DOCS = Path(__file__).resolve().parent
 PAGES = ("commands", "yaml", "laws", "topics", "parameters")

@@ -17,13 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from limb_nodes.analysis.course import Course, course_of_movement
-from limb_nodes.bags.activation import load_activation
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import load_limb
 from limb_nodes.model.limb import Limb
 from limb_nodes.model.load import with_values
 from limb_nodes.model.shipped import shipped
+from limb_nodes.signals.activation import load_activation
 from limb_nodes.solve.whole import WholeModel
 
 IndexArray = npt.NDArray[np.intp]

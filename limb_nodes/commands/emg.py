@@ -6,11 +6,11 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from limb_nodes.bags.emg import EnvelopeOptions, Envelopes, envelopes, write_envelopes
-from limb_nodes.bags.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
 from limb_nodes.bags.folder import refuse_existing
-from limb_nodes.bags.recording import RAW_TOPIC, read_recording
 from limb_nodes.errors import UserError
+from limb_nodes.signals.emg import EnvelopeOptions, Envelopes, envelopes, write_envelopes
+from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
+from limb_nodes.signals.recording import RAW_TOPIC, read_recording
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

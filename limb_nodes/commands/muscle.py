@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from limb_nodes.errors import UserError
 
 if TYPE_CHECKING:
-    from limb_nodes.bags.activation import Activation
+    from limb_nodes.signals.activation import Activation
     from limb_nodes.solve.bench import Course, MuscleBench
 
 PICTURES = (".png", ".pdf", ".svg")
@@ -137,7 +137,7 @@ def course_of(args: argparse.Namespace, bench: MuscleBench) -> Course:
     """The muscle-tendon length that was asked for."""
     import numpy as np
 
-    from limb_nodes.bags.length_course import read_length_course
+    from limb_nodes.signals.length_course import read_length_course
     from limb_nodes.solve.bench import Course, isokinetic, isometric, ramp
 
     if args.lengths:
@@ -172,7 +172,7 @@ def course_of(args: argparse.Namespace, bench: MuscleBench) -> Course:
 
 def activation_of(args: argparse.Namespace, bench: MuscleBench, course: Course) -> Activation:
     """The muscle's activation over the duration that was asked for, or over all that is prescribed."""
-    from limb_nodes.bags.activation import load_activation
+    from limb_nodes.signals.activation import load_activation
 
     source, name = args.activation, bench.muscle.name
     try:

@@ -35,9 +35,9 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Solve, record, print a summary."""
-    from limb_nodes.bags.activation import load_activation
     from limb_nodes.bags.folder import refuse_existing
     from limb_nodes.model import load_limb, user_sources
+    from limb_nodes.signals.activation import load_activation
 
     limb = load_limb(args.limb)
     if args.tolerance is not None and not 1e-14 <= args.tolerance <= 1e-2:

@@ -8,12 +8,12 @@ import numpy as np
 from limb_msgs.msg import MuscleActivation
 from sensor_msgs.msg import JointState
 
-from limb_nodes.bags.activation import Activation, load_activation
 from limb_nodes.errors import UserError
 from limb_nodes.nodes.base import LimbNode
 from limb_nodes.nodes.qos import LIVE, STREAM
 from limb_nodes.nodes.running import main_of
 from limb_nodes.nodes.wire import Incoming, Outgoing
+from limb_nodes.signals.activation import Activation, load_activation
 
 
 class ActivationInput(LimbNode):

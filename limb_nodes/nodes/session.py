@@ -331,10 +331,10 @@ def recorded_outcome(run: Run, seconds: float, interrupted: bool) -> Outcome:
 
 def checked(run: Run) -> tuple[Run, int | None]:
     """Check a run before anything is written; the run with absolute paths and its last tick."""
-    from limb_nodes.bags.activation import load_activation
     from limb_nodes.bags.folder import refuse_existing
     from limb_nodes.model import load_limb
     from limb_nodes.nodes.ticks import Ticks
+    from limb_nodes.signals.activation import load_activation
 
     limb = load_limb(run.limb)
     Ticks(run.rate)

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from limb_nodes.bags.activation import load_activation
 from limb_nodes.bags.read import BagReader
 from limb_nodes.model import load_limb
 from limb_nodes.nodes.session import CLASSES, Run, checked, run_in_one_process, run_in_processes
+from limb_nodes.signals.activation import load_activation
 from limb_nodes.solve.stepping import LimbStepper, MuscleStepper
 from limb_nodes.solve.whole import WholeModel
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
 import os
 import re
@@ -31,18 +30,6 @@ def test_the_versions_agree() -> None:
 @pytest.mark.parametrize("node", NODES)
 def test_each_node_is_a_module_with_main(node: str) -> None:
     assert callable(importlib.import_module(f"limb_nodes.nodes.{node}").main)
-
-
-def test_only_nodes_import_ros() -> None:
-    importing = {
-        path.relative_to(ROOT).as_posix()
-        for path in (ROOT / "limb_nodes").rglob("*.py")
-        for item in ast.walk(ast.parse(path.read_text()))
-        if isinstance(item, ast.Import | ast.ImportFrom)
-        for name in ([item.module or ""] if isinstance(item, ast.ImportFrom) else [a.name for a in item.names])
-        if name.split(".")[0] in {"rclpy", "limb_msgs", "sensor_msgs", "std_msgs", "geometry_msgs", "diagnostic_msgs"}
-    }
-    assert {path for path in importing if not path.startswith("limb_nodes/nodes/")} == set()
 
 
 def test_every_message_is_built_and_every_field_has_a_comment_or_a_name() -> None:

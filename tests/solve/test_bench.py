@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from limb_nodes.bags.length_course import read_length_course
 from limb_nodes.cli import main
 from limb_nodes.errors import UserError
 from limb_nodes.model import load_limb, with_values
+from limb_nodes.signals.length_course import read_length_course
 from limb_nodes.solve.bench import Course, MuscleBench, isokinetic, isometric, ramp
 from tests.independent.reference_joint import (
     DAMPING,

@@ -11,12 +11,12 @@ import numpy.typing as npt
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from limb_nodes.bags.emg import ANGLE_TOPIC, ENVELOPE_TOPIC
 from limb_nodes.bags.read import BagReader
 from limb_nodes.bags.types import RUN_INFO, TOPIC_TYPES
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import Limb, parse_limb
+from limb_nodes.signals.emg import ANGLE_TOPIC, ENVELOPE_TOPIC
 
 DRAWN = ("activation", ENVELOPE_TOPIC, "motor_unit_state", "muscle_state", "joint_torque", "joint_states", ANGLE_TOPIC)
 MUSCLE_FIELDS = (

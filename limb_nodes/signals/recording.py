@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from limb_nodes.bags.named_values import is_bag, read_named_values
-from limb_nodes.bags.table import TIME_UNITS, Table, check_names, delimiter_of, parse_rows, read_lines, read_table
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.signals.named_values import is_bag, read_named_values
+from limb_nodes.signals.table import TIME_UNITS, Table, check_names, delimiter_of, parse_rows, read_lines, read_table
 
 RAW_TOPIC = "emg_raw"
 MOST_RATE = 1e6

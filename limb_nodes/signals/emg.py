@@ -11,14 +11,14 @@ import numpy as np
 import scipy
 
 from limb_nodes import __version__
-from limb_nodes.bags import envelope as steps
-from limb_nodes.bags.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
-from limb_nodes.bags.recording import Recording
-from limb_nodes.bags.table import ANGLE_UNITS, VOLTAGE_UNITS
 from limb_nodes.bags.types import TOPIC_TYPES, make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.signals import envelope as steps
+from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
+from limb_nodes.signals.recording import Recording
+from limb_nodes.signals.table import ANGLE_UNITS, VOLTAGE_UNITS
 
 ENVELOPE_TOPIC = "emg_envelope"
 ANGLE_TOPIC = "reference_angle"

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from limb_nodes.bags.activation import load_activation
 from limb_nodes.errors import UserError
+from limb_nodes.signals.activation import load_activation
 
 PARAMS = Path(__file__).parents[2] / "params"
 RATE = 100.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from limb_nodes.bags.envelope import (
+from limb_nodes.signals.envelope import (
     band_pass,
     bridge_gaps,
     low_pass,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from limb_nodes.bags.activation import load_activation
 from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
+from limb_nodes.signals.activation import load_activation
 
 MUSCLES = ["flexor", "extensor"]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from limb_nodes.bags.table import TIME_UNITS, read_table
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.signals.table import TIME_UNITS, read_table
 
 LENGTH_UNITS = {"": 1.0, "m": 1.0, "mm": 1e-3}
 

@@ -5,13 +5,13 @@ import argparse
 import numpy as np
 import pytest
 
-from limb_nodes.bags.emg import EnvelopeOptions, envelopes
 from limb_nodes.bags.read import BagReader
-from limb_nodes.bags.recording import Recording
 from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.commands import emg
 from limb_nodes.errors import UserError
+from limb_nodes.signals.emg import EnvelopeOptions, envelopes
+from limb_nodes.signals.recording import Recording
 
 SAMPLES = 2000
 

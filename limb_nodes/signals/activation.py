@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from limb_nodes.bags.named_values import is_bag, read_named_values
-from limb_nodes.bags.table import TIME_UNITS, read_table
-from limb_nodes.bags.waveform import Waveform, parse_constants, read_waveforms, sample_waveforms
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.signals.named_values import is_bag, read_named_values
+from limb_nodes.signals.table import TIME_UNITS, read_table
+from limb_nodes.signals.waveform import Waveform, parse_constants, read_waveforms, sample_waveforms
 
 # A recorded run holds what drove its muscles on the first topic, a recording of EMG on the second.
 ACTIVATION_TOPICS = ("activation", "emg_envelope")
@@ -55,7 +55,7 @@ def load_activation(source: str, muscles: Sequence[str], rate: float, duration: 
     """Load activations for some muscles, at k / rate for k = 0 ... duration * rate.
 
     source: a bag with the topic `activation` or `emg_envelope`; a tab- or comma-separated file with a column
-    of times (s) and one per muscle; a waveform YAML (`limb_nodes.bags.waveform`); or constants in a line,
+    of times (s) and one per muscle; a waveform YAML (`limb_nodes.signals.waveform`); or constants in a line,
     `flexor=0.9,extensor=0`. Recordings are taken along straight lines between their samples, from
     their first sample on. Muscles of the source that are not asked for are left out, and noted.
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from limb_nodes.bags.recording import read_recording
 from limb_nodes.errors import UserError
+from limb_nodes.signals.recording import read_recording
 
 CHANNELS = """File Name: made.log
 Channel 1: 'RF', 3 values, engineering units: mV, no filters.
