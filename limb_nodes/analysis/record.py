@@ -10,6 +10,7 @@ import numpy as np
 
 from limb_nodes.bags.bulk import write_table
 from limb_nodes.bags.write import BagWriter
+from limb_nodes.foundation.topics import LATCHED_TOPICS, TOPIC_TYPES
 from limb_nodes.model.points import point_names, points
 from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, UNIT_FIELDS
 from limb_nodes.solve.whole import Movement, WholeModel
@@ -36,10 +37,11 @@ def write_movement(
     position = np.zeros((count, len(point_names(limb)), 3))
     position[:, :, :2] = [points(limb, angle) for angle in movement.angle]
     empty = np.empty((count, 0))
-    with BagWriter(path, run_info) as writer:
+    with BagWriter(path, run_info, latched=LATCHED_TOPICS) as writer:
         write_table(
             writer,
             "activation",
+            TOPIC_TYPES["activation"],
             stamps,
             {"name": muscles},
             {"tick": tick, "last_tick": last, "activation": movement.excitation},
@@ -47,6 +49,7 @@ def write_movement(
         write_table(
             writer,
             "joint_states",
+            TOPIC_TYPES["joint_states"],
             stamps,
             {"name": joints},
             {"position": movement.angle, "velocity": movement.velocity, "effort": empty},
@@ -54,6 +57,7 @@ def write_movement(
         write_table(
             writer,
             "joint_torque",
+            TOPIC_TYPES["joint_torque"],
             stamps,
             {"joint": joints},
             {"tick": tick, "last_tick": last, "torque": torque},
@@ -61,6 +65,7 @@ def write_movement(
         write_table(
             writer,
             "movement_pattern",
+            TOPIC_TYPES["movement_pattern"],
             stamps,
             {"joint": joints, "point": point_names(limb)},
             {
@@ -79,4 +84,4 @@ def write_movement(
             ("sarcomere_state", {"muscle": owners, "unit": units}, SARCOMERE_FIELDS, movement.unit),
         ):
             numbers = {field: values[name] for field, name in fields.items()}
-            write_table(writer, topic, stamps, names, {"tick": tick, **numbers})
+            write_table(writer, topic, TOPIC_TYPES[topic], stamps, names, {"tick": tick, **numbers})

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from rosbags.interfaces import Nodetype
 
 from limb_nodes.bags.columns import Layout
-from limb_nodes.bags.types import TOPIC_TYPES, limb_typestore, make_message
+from limb_nodes.bags.types import fields_of, limb_typestore, make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.foundation.arrays import IntArray
 
@@ -19,43 +20,52 @@ SECOND = 1_000_000_000
 def write_table(
     writer: BagWriter,
     topic: str,
+    msgtype: str,
     stamps: IntArray,
-    texts: Mapping[str, Any],
+    same: Mapping[str, Any],
     numbers: Mapping[str, npt.NDArray[Any]],
 ) -> None:
     """Write one message per stamp.
 
     Args:
-        stamps: [ticks], ns.
-        texts: the fields that are the same in every message, such as names.
-        numbers: the other fields, [ticks] or [ticks, ...]; points as [ticks, n, 3].
+        writer: the open bag.
+        topic: relative to the namespace, or absolute.
+        msgtype: a type with a header, for example `limb_msgs/msg/JointTorque`.
+        stamps: [messages], ns; at least one.
+        same: the fields that are the same in every message, such as names.
+        numbers: the other fields, [messages] or [messages, n]; points as [messages, n, 3].
+
+    Raises:
+        UserError: the bag can't be written, for example because the disk is full.
     """
-    msgtype = TOPIC_TYPES[topic]
     store = limb_typestore()
-    first = {name: example(msgtype, name, values[0]) for name, values in numbers.items()}
-    message = make_message(msgtype, 0, **texts, **first)
-    data = bytes(store.serialize_cdr(message, msgtype))
+    first = {name: _field_value(msgtype, name, values[0]) for name, values in numbers.items()}
+    data = bytes(store.serialize_cdr(make_message(msgtype, 0, **same, **first), msgtype))
     layout = Layout(data, store)
     layout.message(msgtype, "")
     rows = np.tile(np.frombuffer(data, dtype=np.uint8), (len(stamps), 1))
-    put(rows, 4, (stamps // SECOND).astype("<i4"))
-    put(rows, 8, (stamps % SECOND).astype("<u4"))
+    _put(rows, 4, (stamps // SECOND).astype("<i4"))
+    _put(rows, 8, (stamps % SECOND).astype("<u4"))
     for name, values in numbers.items():
         start, dtype, _ = layout.numbers[name]
-        put(rows, start, np.asarray(values).astype(dtype))
+        _put(rows, start, np.asarray(values).astype(dtype))
     whole, size = rows.tobytes(), len(data)
     messages = (whole[start : start + size] for start in range(0, len(whole), size))
     writer.write_many(topic, zip(stamps.tolist(), messages, strict=True), msgtype)
 
 
-def example(msgtype: str, name: str, value: Any) -> Any:
-    """The first value of a field in the form that a message takes."""
-    if name == "position" and msgtype.endswith("MovementPattern"):
-        return [make_message("geometry_msgs/msg/Point", x=x, y=y, z=z) for x, y, z in value]
+def _field_value(msgtype: str, name: str, value: Any) -> Any:
+    """Numbers in the form that a field of a message takes: [n, k] as n messages of k numbers, such as points."""
+    store = limb_typestore()
+    node, detail = dict(fields_of(msgtype, store))[name]
+    if node in (Nodetype.ARRAY, Nodetype.SEQUENCE) and detail[0][0] == Nodetype.NAME:
+        element = detail[0][1]
+        fields = [field for field, _ in fields_of(element, store)]
+        return [make_message(element, **dict(zip(fields, row, strict=True))) for row in value.tolist()]
     return value.item() if np.ndim(value) == 0 else np.ascontiguousarray(value)
 
 
-def put(rows: npt.NDArray[np.uint8], start: int, values: npt.NDArray[Any]) -> None:
+def _put(rows: npt.NDArray[np.uint8], start: int, values: npt.NDArray[Any]) -> None:
     """Overwrite the bytes of a field in all rows."""
     flat = np.ascontiguousarray(values).reshape(len(rows), -1).view(np.uint8)
     rows[:, start : start + flat.shape[1]] = flat

@@ -1,4 +1,4 @@
-"""The message types that a bag of a limb holds, for use without ROS."""
+"""The message types that bags hold, for use without ROS."""
 
 from __future__ import annotations
 
@@ -16,25 +16,7 @@ from rosbags.typesys.store import Typestore
 from limb_nodes.errors import UserError
 
 RUN_INFO = "run_info"
-
-TOPIC_TYPES: dict[str, str] = {
-    "emg_envelope": "limb_msgs/msg/MuscleActivation",
-    "activation": "limb_msgs/msg/MuscleActivation",
-    "joint_torque": "limb_msgs/msg/JointTorque",
-    "joint_states": "sensor_msgs/msg/JointState",
-    "movement_pattern": "limb_msgs/msg/MovementPattern",
-    "muscle_state": "limb_msgs/msg/MuscleState",
-    "motor_unit_state": "limb_msgs/msg/MotorUnitState",
-    "sarcomere_state": "limb_msgs/msg/SarcomereState",
-    "external_load": "geometry_msgs/msg/WrenchStamped",
-    RUN_INFO: "std_msgs/msg/String",
-    "robot_description": "std_msgs/msg/String",
-    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
-}
-"""Topic (relative to the limb's namespace) -> message type."""
-
-LATCHED = frozenset({RUN_INFO, "robot_description", "joint_states"})
-"""Topics whose newest message a late subscriber still gets (transient-local)."""
+"""The topic on which a bag holds what is needed to run it again, as a std_msgs/String in YAML."""
 
 
 def message_folder() -> Path:

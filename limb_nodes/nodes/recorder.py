@@ -28,10 +28,10 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Int64, String
 
 from limb_nodes.bags.folder import refuse_existing
-from limb_nodes.bags.types import TOPIC_TYPES
 from limb_nodes.bags.versions import versions
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.topics import LATCHED_TOPICS, TOPIC_TYPES
 from limb_nodes.model import user_sources
 from limb_nodes.nodes.base import NODES, LimbNode
 from limb_nodes.nodes.qos import EVERY, LATCHED, STREAM
@@ -140,7 +140,7 @@ class Recorder(LimbNode):
         for topic in STATES:
             if muscle_stack.get(f"publish_{topic}", True):
                 self.expected[topic] = int(muscle_stack.get("state_every", 1))
-        self.writer = BagWriter(self.path, self.run_info(), namespace=self.get_namespace())
+        self.writer = BagWriter(self.path, self.run_info(), namespace=self.get_namespace(), latched=LATCHED_TOPICS)
         reports = ("/diagnostics",) if self.mode == "realtime" else ()
         self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.expected, *reports)})
         for topic, messages in self.buffer:

@@ -11,10 +11,11 @@ import numpy as np
 import scipy
 
 from limb_nodes import __version__
-from limb_nodes.bags.types import TOPIC_TYPES, make_message
+from limb_nodes.bags.bulk import write_table
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.signals import envelope as steps
 from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
 from limb_nodes.signals.recording import Recording
@@ -148,8 +149,6 @@ def envelopes(recording: Recording, options: EnvelopeOptions | None = None) -> E
     )
     angle_channels = tuple(AngleChannel(column, name, angle_gaps[i]) for i, (column, name) in enumerate(angle_columns))
     notes = recording.notes + _left_out(recording, options)
-    # Serialising a row needs its values side by side in memory.
-    values, angles = np.ascontiguousarray(values), np.ascontiguousarray(angles)
     return Envelopes(recording.source, rate, channels, values, angle_channels, angles, notes)
 
 
@@ -290,26 +289,17 @@ def write_envelopes(found: Envelopes, out: str | Path, options: EnvelopeOptions 
         "notes": list(found.notes),
         "versions": {"limb_nodes": __version__, "numpy": np.__version__, "scipy": scipy.__version__},
     }
-    names = list(found.names)
-    angle_names = [channel.name for channel in found.angle_channels]
+    stamps = np.arange(len(found.values), dtype=np.int64) * period
+    ticks = np.arange(len(found.values), dtype=np.uint64)
     with BagWriter(out, run_info) as bag:
-        for tick, values in enumerate(found.values):
-            stamp = tick * period
-            bag.write(
-                ENVELOPE_TOPIC,
-                stamp,
-                make_message(
-                    TOPIC_TYPES[ENVELOPE_TOPIC],
-                    stamp,
-                    tick=tick,
-                    last_tick=len(found.values) - 1,
-                    name=names,
-                    activation=values,
-                ),
-            )
-            if angle_names:
-                bag.write(
-                    ANGLE_TOPIC,
-                    stamp,
-                    make_message("sensor_msgs/msg/JointState", stamp, name=angle_names, position=found.angles[tick]),
-                )
+        write_table(
+            bag,
+            ENVELOPE_TOPIC,
+            TOPIC_TYPES[ENVELOPE_TOPIC],
+            stamps,
+            {"name": found.names, "last_tick": len(found.values) - 1},
+            {"tick": ticks, "activation": found.values},
+        )
+        if found.angle_channels:
+            names = [channel.name for channel in found.angle_channels]
+            write_table(bag, ANGLE_TOPIC, TOPIC_TYPES[ANGLE_TOPIC], stamps, {"name": names}, {"position": found.angles})

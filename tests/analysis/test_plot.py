@@ -19,9 +19,10 @@ from limb_nodes.analysis.plot.panels import columns_of, look_of
 from limb_nodes.analysis.plot.picture import picture
 from limb_nodes.analysis.plot.series import Series, read_run
 from limb_nodes.analysis.plot.thin import pooled, thinned
-from limb_nodes.bags.types import TOPIC_TYPES, make_message
+from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.levels.muscle.path import muscle_tendon_length
 from limb_nodes.model import load_limb, parse_limb
 from limb_nodes.model.points import points

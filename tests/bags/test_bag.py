@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.interfaces import QosDurability
 from rosbags.rosbag2 import Reader
 
 from limb_nodes.bags.read import BagReader
-from limb_nodes.bags.types import TOPIC_TYPES, limb_typestore, make_message
+from limb_nodes.bags.types import limb_typestore, make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.topics import TOPIC_TYPES
 
 PERIOD_NS = 1_000_000
 INFO = {"limb": "name: knee\ngravity: [0.0, -9.81]\n", "seed": 3, "parameters": {"rate": 1000.0}}
@@ -183,6 +185,20 @@ def test_a_namespace_is_part_of_the_name_and_may_be_left_out_when_reading(tmp_pa
         assert bag.count("joint_torque") == bag.count("/left/joint_torque") == 2
         assert not bag.has("/joint_torque")
         assert bag.run_info() == INFO
+
+
+def test_latched_topics_are_offered_to_late_subscribers(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "run", {}, latched={"joint_states"}) as bag:
+        bag.expect({"joint_states": TOPIC_TYPES["joint_states"], "activation": TOPIC_TYPES["activation"]})
+    with Reader(tmp_path / "run") as reader:
+        offered = {
+            connection.topic: connection.ext.offered_qos_profiles[0].durability  # type: ignore[union-attr]
+            for connection in reader.connections
+        }
+    assert {topic for topic, durability in offered.items() if durability == QosDurability.TRANSIENT_LOCAL} == {
+        "/joint_states",
+        "/run_info",
+    }
 
 
 def test_a_name_that_fits_two_topics_is_refused(tmp_path: Path) -> None:

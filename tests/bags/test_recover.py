@@ -15,13 +15,15 @@ from mcap.stream_reader import StreamReader
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.bags.recover import recover
-from limb_nodes.bags.types import RUN_INFO, TOPIC_TYPES, limb_typestore, make_message
+from limb_nodes.bags.types import RUN_INFO, limb_typestore, make_message
 from limb_nodes.bags.write import BagWriter, open_writer
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.topics import TOPIC_TYPES
 
 RECORD_WITHOUT_END = """
 import sys
-from limb_nodes.bags.types import TOPIC_TYPES, make_message
+from limb_nodes.bags.types import make_message
+from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.bags.write import BagWriter
 
 bag = BagWriter(sys.argv[1], {"seed": 7}, flush_period=0.05)

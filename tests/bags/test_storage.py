@@ -9,7 +9,8 @@ import pytest
 from rosbags.interfaces import Connection
 
 from limb_nodes.bags.storage import Storage
-from limb_nodes.bags.types import TOPIC_TYPES, limb_typestore
+from limb_nodes.bags.types import limb_typestore
+from limb_nodes.foundation.topics import TOPIC_TYPES
 
 TOPICS = ("activation", "joint_torque")
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from limb_nodes.bags.types import TOPIC_TYPES, make_message
+from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.cli import main
+from limb_nodes.foundation.topics import TOPIC_TYPES
 
 
 @pytest.fixture(scope="module")

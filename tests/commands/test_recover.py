@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from limb_nodes.bags.read import BagReader
-from limb_nodes.bags.types import TOPIC_TYPES, make_message
+from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.cli import main
+from limb_nodes.foundation.topics import TOPIC_TYPES
 
 
 @pytest.fixture

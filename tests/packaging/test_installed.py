@@ -14,8 +14,9 @@ import pytest
 
 import limb_nodes
 from limb_nodes.bags.read import BagReader
-from limb_nodes.bags.types import TOPIC_TYPES, limb_typestore
+from limb_nodes.bags.types import limb_typestore
 from limb_nodes.bags.write import BagWriter
+from limb_nodes.foundation.topics import TOPIC_TYPES
 
 ROOT = Path(__file__).resolve().parents[2]
 NODES = re.findall(r"\w+", re.search(r"foreach\(node (.*)\)", (ROOT / "limb_nodes/install.cmake").read_text())[1])  # type: ignore[index]

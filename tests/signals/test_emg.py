@@ -1,16 +1,18 @@
 """From a recording to envelopes in a bag: the choice of channels, the options, the command."""
 
 import argparse
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from limb_nodes.bags.read import BagReader
-from limb_nodes.bags.types import make_message
+from limb_nodes.bags.types import limb_typestore, make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.commands import emg
 from limb_nodes.errors import UserError
-from limb_nodes.signals.emg import EnvelopeOptions, envelopes
+from limb_nodes.foundation.topics import TOPIC_TYPES
+from limb_nodes.signals.emg import EnvelopeOptions, envelopes, write_envelopes
 from limb_nodes.signals.recording import Recording
 
 SAMPLES = 2000
@@ -179,6 +181,29 @@ def test_command_writes_every_sample_and_says_what_it_did(raw_file, tmp_path, ca
     assert info["source"] == str(raw_file)
     assert info["parameters"]["band"] == [20.0, 450.0]
     assert info["channels"][0]["gaps"] == {"count": 1, "samples": 1, "longest": 1}
+
+
+def test_every_message_is_as_if_written_by_itself(tmp_path):
+    raw = recording(rate=900.0)
+    raw.values[:, 3] *= np.linspace(-30, 30, SAMPLES)
+    raw = replace(raw, units=("mV", "uV", "deg", "rad"))
+    found = envelopes(raw, EnvelopeOptions(band=(20.0, 400.0)))
+    write_envelopes(found, tmp_path / "env")
+    with BagReader(tmp_path / "env") as bag:
+        rows = {topic: list(bag.read_topic(topic)) for topic in ("emg_envelope", "reference_angle")}
+    for topic, fields, values in (
+        ("emg_envelope", {"name": ["RF", "VM"], "last_tick": SAMPLES - 1}, {"activation": found.values}),
+        ("reference_angle", {"name": ["FX", "force"]}, {"position": found.angles}),
+    ):
+        assert len(rows[topic]) == SAMPLES
+        for tick, (stamp, message) in enumerate(rows[topic]):
+            own = {name: np.ascontiguousarray(column[tick]) for name, column in values.items()}
+            if topic == "emg_envelope":
+                own["tick"] = tick
+            assert stamp == round(1e9 / 900) * tick
+            expected = make_message(TOPIC_TYPES[topic], stamp, **fields, **own)
+            store = limb_typestore()
+            assert store.serialize_cdr(message, TOPIC_TYPES[topic]) == store.serialize_cdr(expected, TOPIC_TYPES[topic])
 
 
 def test_bag_of_raw_emg_gives_the_same_envelopes(raw_file, tmp_path):

@@ -12,9 +12,10 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from limb_nodes.bags.read import BagReader
-from limb_nodes.bags.types import RUN_INFO, TOPIC_TYPES
+from limb_nodes.bags.types import RUN_INFO
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.model import Limb, parse_limb
 from limb_nodes.signals.emg import ANGLE_TOPIC, ENVELOPE_TOPIC
 
@@ -199,7 +200,7 @@ def _shown(path: str | Path, bag: _Bag, start: float | None, end: float | None) 
 
 def _prefix(reader: BagReader, namespace: str) -> str:
     """The namespace of the topics to draw, as `/left`, or empty."""
-    known = {topic for topic in (*TOPIC_TYPES, ANGLE_TOPIC) if not topic.startswith("/")}
+    known = {topic for topic in TOPIC_TYPES if not topic.startswith("/")}
     drawn: set[str] = set()
     for topic in reader.topics:
         prefix, _, name = topic.rpartition("/")

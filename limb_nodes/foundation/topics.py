@@ -1,0 +1,23 @@
+"""Topics of a limb: their names relative to the limb's namespace, their types, and which of them are latched."""
+
+from __future__ import annotations
+
+TOPIC_TYPES: dict[str, str] = {
+    "emg_envelope": "limb_msgs/msg/MuscleActivation",
+    "reference_angle": "sensor_msgs/msg/JointState",
+    "activation": "limb_msgs/msg/MuscleActivation",
+    "joint_torque": "limb_msgs/msg/JointTorque",
+    "joint_states": "sensor_msgs/msg/JointState",
+    "movement_pattern": "limb_msgs/msg/MovementPattern",
+    "muscle_state": "limb_msgs/msg/MuscleState",
+    "motor_unit_state": "limb_msgs/msg/MotorUnitState",
+    "sarcomere_state": "limb_msgs/msg/SarcomereState",
+    "external_load": "geometry_msgs/msg/WrenchStamped",
+    "run_info": "std_msgs/msg/String",
+    "robot_description": "std_msgs/msg/String",
+    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+}
+"""Topic -> message type."""
+
+LATCHED_TOPICS = frozenset({"robot_description", "joint_states"})
+"""Topics whose newest message a late subscriber still gets (transient-local)."""
