@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from limb_nodes import __version__, commands
-from limb_nodes.errors import UserError
+from limb_nodes.errors import FieldError, UserError
 
 
 class Parser(argparse.ArgumentParser):
@@ -29,6 +29,10 @@ def parser(names: Sequence[str]) -> argparse.ArgumentParser:
     for name in names:
         module = importlib.import_module(f"limb_nodes.commands.{name}")
         module.add_parser(subparsers)
+    for subparser in subparsers.choices.values():
+        # The name under which the library knows what an option gives -> the option.
+        options = {action.dest: action.option_strings[-1] for action in subparser._actions if action.option_strings}
+        subparser.set_defaults(options=options)
     return top
 
 
@@ -38,12 +42,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     known = sorted(module.name for module in pkgutil.iter_modules(commands.__path__))
     # A command that is named first needs no other command's modules.
     names = [given[0]] if given and given[0] in known else known
+    options: dict[str, str] = {}
     try:
         parsed = parser(names).parse_args(given)
+        options = parsed.options
         module = importlib.import_module(f"limb_nodes.commands.{parsed.command}")
         return int(module.run(parsed))
     except UserError as error:
-        print(f"limb: error: {error}", file=sys.stderr)
+        line = error.line(options.get(error.field, error.field)) if isinstance(error, FieldError) else str(error)
+        print(f"limb: error: {line}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("limb: interrupted", file=sys.stderr)

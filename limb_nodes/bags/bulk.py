@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from rosbags.interfaces import Nodetype
 
-from limb_nodes.bags.columns import Layout
+from limb_nodes.bags.columns import MessageLayout
 from limb_nodes.bags.types import fields_of, limb_typestore, make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.foundation.arrays import IntArray
@@ -41,7 +41,7 @@ def write_table(
     store = limb_typestore()
     first = {name: _field_value(msgtype, name, values[0]) for name, values in numbers.items()}
     data = bytes(store.serialize_cdr(make_message(msgtype, 0, **same, **first), msgtype))
-    layout = Layout(data, store)
+    layout = MessageLayout(data, store)
     layout.message(msgtype, "")
     rows = np.tile(np.frombuffer(data, dtype=np.uint8), (len(stamps), 1))
     _put(rows, 4, (stamps // SECOND).astype("<i4"))

@@ -31,7 +31,7 @@ def columns(messages: Sequence[bytes], msgtype: str, store: Typestore) -> Column
         ValueError: the messages differ in shape or names.
     """
     first = messages[0]
-    layout = Layout(first, store)
+    layout = MessageLayout(first, store)
     layout.message(msgtype, "")
     size = len(first)
     if any(len(message) != size for message in messages):
@@ -40,17 +40,17 @@ def columns(messages: Sequence[bytes], msgtype: str, store: Typestore) -> Column
     for start, end in layout.constant:
         if not (table[:, start:end] == table[0, start:end]).all():
             raise ValueError("its messages differ in their names or numbers of values, so that they make no table")
-    found: Columns = {name: np.array(texts) for name, texts in layout.texts.items()}
+    arrays: Columns = {name: np.array(texts) for name, texts in layout.texts.items()}
     for name, (start, dtype, shape) in layout.numbers.items():
         width = int(np.prod(shape, dtype=np.int64)) * dtype.itemsize
         cut = np.ascontiguousarray(table[:, start : start + width])
         native = cut.view(dtype).astype(dtype.newbyteorder("="), copy=False)
-        found[name] = native.reshape(len(messages), *shape)
-    return {name: found[name] for name in layout.order}
+        arrays[name] = native.reshape(len(messages), *shape)
+    return {name: arrays[name] for name in layout.order}
 
 
-class Layout:
-    """Walks through one message in CDR and notes where each field is.
+class MessageLayout:
+    """Walks through one message in CDR and notes at which byte each field stands.
 
     Attributes:
         numbers: field -> offset in bytes, type, shape.

@@ -8,9 +8,9 @@ from limb_nodes.errors import UserError
 
 
 def refuse_existing(path: Path) -> None:
-    """Raise UserError where a folder that is to be made is there already, or would be within a file."""
+    """Raise UserError if a folder that is to be made is there already, or would be within a file."""
     if path.exists() or path.is_symlink():
-        raise UserError(f"{path}: exists already; give the name of a folder that does not")
+        raise UserError(f"{path}: exists already; the name of a new folder is needed")
     above = next(parent for parent in path.absolute().parents if parent.exists())
     if not above.is_dir():
-        raise UserError(f"{path}: the folder for the bag can't be made: {above} is not a folder")
+        raise UserError(f"{path}: cannot be made, for {above} is no folder; another name is needed")

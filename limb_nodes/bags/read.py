@@ -24,7 +24,7 @@ from limb_nodes.foundation.arrays import IntArray
 class BagReader:
     """Reads one bag (a rosbag2 folder, or the MCAP or sqlite3 file in it); a context manager.
 
-    Topics may be asked for by their absolute name, or by the end of it where only one topic ends so: `joint_states`
+    Topics may be asked for by their absolute name, or by the end of it if only one topic ends so: `joint_states`
     finds `/left/joint_states`. Types that this installation does not know are read by the definition in the bag.
 
     Args:
@@ -42,14 +42,14 @@ class BagReader:
         if self.path.is_dir() and not (self.path / "metadata.yaml").exists():
             if any(self.path.glob("*.mcap")):
                 raise _unfinished(self.path)
-            raise UserError(f"{self.path}: not a bag; a bag is a folder with a metadata.yaml and a file of messages")
+            raise UserError(f"{self.path}: is no bag; a folder with a metadata.yaml and a file of messages is needed")
         try:
             self._reader = Reader(self.path)
             self._reader.open()
         except Exception as error:  # the library has no one class for what damage can do to it
             if "end magic" in str(error):
                 raise _unfinished(self.path) from None
-            raise UserError(f"{self.path}: not a bag that can be read: {_one_line(error)}") from None
+            raise UserError(f"{self.path}: is no bag that can be read: {_one_line(error)}") from None
         self._topics: dict[str, Connection] = {}
         for connection in self._reader.connections:
             self._topics.setdefault(connection.topic, connection)
@@ -60,7 +60,7 @@ class BagReader:
         return {name: connection.msgtype for name, connection in sorted(self._topics.items())}
 
     def count(self, topic: str) -> int:
-        """The number of messages of a topic, 0 where the bag does not have it."""
+        """The number of messages of a topic, 0 if the bag does not have it."""
         name = self._find(topic)
         return sum(c.msgcount for c in self._reader.connections if c.topic == name) if name else 0
 
@@ -81,8 +81,8 @@ class BagReader:
                 info = None
             if isinstance(info, dict):
                 return info
-            raise UserError(f"{self.path}: {RUN_INFO} is not a mapping in YAML; was the bag written by limb?")
-        raise UserError(f"{self.path}: {RUN_INFO} has no message; was the bag written by limb?")
+            raise UserError(f"{self.path}: {RUN_INFO} is no mapping in YAML; a bag that limb wrote is needed")
+        raise UserError(f"{self.path}: {RUN_INFO} has no message; a bag that limb wrote is needed")
 
     def read_topic(self, topic: str) -> Iterator[tuple[int, Any]]:
         """The messages of a topic in the order of time.
@@ -145,14 +145,14 @@ class BagReader:
         self.close()
 
     def _find(self, topic: str) -> str | None:
-        """The absolute name of a topic, or None where the bag does not have it."""
+        """The absolute name of a topic, or None if the bag does not have it."""
         name = absolute(topic)
         if name in self._topics:
             return name
-        found = [] if topic.startswith("/") else [known for known in self._topics if known.endswith(name)]
-        if len(found) > 1:
-            raise UserError(f"{self.path}: topic {topic}: which of {', '.join(sorted(found))}?")
-        return found[0] if found else None
+        matches = [] if topic.startswith("/") else [known for known in self._topics if known.endswith(name)]
+        if len(matches) > 1:
+            raise UserError(f"{self.path}: topic {topic} is there twice; one of {', '.join(sorted(matches))} is needed")
+        return matches[0] if matches else None
 
     def _connection(self, topic: str) -> Connection:
         name = self._find(topic)
@@ -161,7 +161,7 @@ class BagReader:
         return self._topics[name]
 
     def _types(self, connection: Connection) -> Typestore:
-        """The types to decode a topic with, completed from the bag where they are not known."""
+        """The types to decode a topic with, completed from the bag if they are not known."""
         store = limb_typestore()
         if connection.msgtype not in store.fielddefs:
             definition = connection.msgdef

@@ -21,7 +21,7 @@ from limb_nodes.errors import UserError
 
 @dataclass
 class Recovered:
-    """What `recover` found.
+    """What `recover` could still read.
 
     Attributes:
         path: the new bag.
@@ -52,26 +52,26 @@ def recover(bag_dir: str | Path, out_dir: str | Path) -> Recovered:
     if not source.exists():
         raise UserError(f"{source}: no such bag")
     if not files:
-        raise UserError(f"{source}: nothing to recover: no .mcap file in it")
+        raise UserError(f"{source}: holds no .mcap file; one is needed")
     refuse_existing(path)
     if not any(isinstance(record, Message) for file in files for record in _records(file, Recovered(path))):
-        raise UserError(f"{source}: nothing to recover: no whole message in it")
-    found = Recovered(path)
+        raise UserError(f"{source}: holds no whole message; at least one is needed")
+    recovered = Recovered(path)
     writer = open_writer(path, compressed=True)
     try:
         for file in files:
-            _copy(file, writer, found)
+            _copy(file, writer, recovered)
         writer.close()
     except OSError as error:
-        raise UserError(f"{path}: the bag can't be written: {error}") from None
-    return found
+        raise UserError(f"{path}: cannot be written: {error}") from None
+    return recovered
 
 
-def _copy(file: Path, writer: Writer, found: Recovered) -> None:
+def _copy(file: Path, writer: Writer, recovered: Recovered) -> None:
     """Copy the messages of one file."""
     schemas: dict[int, Schema] = {}
     connections: dict[int, Connection] = {}
-    for record in _records(file, found):
+    for record in _records(file, recovered):
         if isinstance(record, Schema):
             schemas[record.id] = record
         elif isinstance(record, Channel) and record.id not in connections:
@@ -79,8 +79,8 @@ def _copy(file: Path, writer: Writer, found: Recovered) -> None:
         elif isinstance(record, Message):
             connection = connections[record.channel_id]
             writer.write(connection, record.log_time, record.data)
-            found.counts[connection.topic] = found.counts.get(connection.topic, 0) + 1
-            found.end_ns = max(found.end_ns, record.log_time)
+            recovered.counts[connection.topic] = recovered.counts.get(connection.topic, 0) + 1
+            recovered.end_ns = max(recovered.end_ns, record.log_time)
 
 
 def _connect(channel: Channel, schema: Schema, writer: Writer) -> Connection:
@@ -99,7 +99,7 @@ def _connect(channel: Channel, schema: Schema, writer: Writer) -> Connection:
 
 
 def _type_hash(schema: Schema) -> str:
-    """The hash by which ROS 2 tells versions of a type apart; zeros where the definition isn't in .msg syntax."""
+    """The hash by which ROS 2 tells versions of a type apart; zeros if the definition isn't in .msg syntax."""
     if schema.encoding != "ros2msg":
         return "RIHS01_" + "0" * 64
     store = get_typestore(Stores.EMPTY)
@@ -107,7 +107,7 @@ def _type_hash(schema: Schema) -> str:
     return store.hash_rihs01(schema.name)
 
 
-def _records(file: Path, found: Recovered) -> Iterator[McapRecord]:
+def _records(file: Path, recovered: Recovered) -> Iterator[McapRecord]:
     """The records of a file up to the first that is damaged or not whole."""
     with file.open("rb") as stream:
         try:
@@ -116,4 +116,4 @@ def _records(file: Path, found: Recovered) -> Iterator[McapRecord]:
         except Exception as error:  # the library has no one class for what damage can do to it
             if isinstance(error, OSError):
                 raise
-            found.truncated = True
+            recovered.truncated = True

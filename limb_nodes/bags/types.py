@@ -52,7 +52,7 @@ def make_message(msgtype: str, stamp_ns: int | None = None, **fields: Any) -> An
 
     Args:
         msgtype: for example `limb_msgs/msg/JointTorque`.
-        stamp_ns: where the type has a header, its stamp, ns.
+        stamp_ns: if the type has a header, its stamp, ns.
         fields: the fields by name; sequences of numbers may be any sequence. What is left out is zero or empty.
 
     Raises:

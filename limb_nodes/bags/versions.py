@@ -12,10 +12,10 @@ PACKAGES = ("numpy", "numba", "rosbags", "ros-rclpy", "scipy")
 
 def versions() -> dict[str, str]:
     """Name of the package -> version, for those that are installed."""
-    found = {"limb_nodes": __version__, "python": platform.python_version()}
+    result = {"limb_nodes": __version__, "python": platform.python_version()}
     for package in PACKAGES:
         try:
-            found[package] = importlib.metadata.version(package)
+            result[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:
             continue
-    return found
+    return result

@@ -131,7 +131,7 @@ class BagWriter:
         self._pass_on()
 
     def _pass_on(self) -> None:
-        """Let the thread write when enough is waiting; wait for it where it falls far behind."""
+        """Let the thread write when enough is waiting; wait for it if it falls far behind."""
         if len(self._pending) >= _BATCH and (self._drained is None or self._drained.done()):
             self._submit()
         elif len(self._pending) > _BACKLOG and self._drained is not None:
@@ -148,7 +148,7 @@ class BagWriter:
         try:
             self._thread.submit(self._finish).result()
         except OSError as error:
-            raise UserError(f"{self.path}: the bag can't be written: {error}") from None
+            raise UserError(f"{self.path}: cannot be written: {error}") from None
         finally:
             self._closed = True
             self._thread.shutdown()
@@ -162,7 +162,7 @@ class BagWriter:
         self.close()
 
     def _connect(self, topic: str, msgtype: str) -> Connection:
-        """The bag's connection for a topic, made in the writer's thread where it is new."""
+        """The bag's connection for a topic, made in the writer's thread if it is new."""
         name = topic if topic.startswith("/") or not self._namespace else f"{self._namespace}/{topic}"
         connection = self._thread.submit(self._add_connection, absolute(name), msgtype, topic in self._latched).result()
         self._connections[topic] = connection
@@ -179,7 +179,7 @@ class BagWriter:
 
     def _submit(self) -> None:
         if self._drained is not None and (error := self._drained.exception()) is not None:
-            raise UserError(f"{self.path}: the bag can't be written: {error}") from None
+            raise UserError(f"{self.path}: cannot be written: {error}") from None
         self._drained = self._thread.submit(self._drain)
 
     def _drain(self) -> None:
@@ -206,11 +206,11 @@ def open_writer(path: Path, *, compressed: bool) -> Storage:
     try:
         return Storage(path, compressed=compressed)
     except (OSError, WriterError) as error:
-        raise UserError(f"{path}: the folder for the bag can't be made: {error}") from None
+        raise UserError(f"{path}: cannot be made: {error}") from None
 
 
 def _qos(*, latched: bool) -> Qos:
-    """Reliable, as every topic of the limb is; transient-local where latched."""
+    """Reliable; transient-local if latched."""
     forever = QosTime(0x7FFFFFFFFFFFFFFF // 1_000_000_000, 0x7FFFFFFFFFFFFFFF % 1_000_000_000)
     return Qos(
         history=QosHistory.KEEP_LAST,

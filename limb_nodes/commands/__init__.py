@@ -1,1 +1,35 @@
-"""The subcommands of `limb`, one module each, with `add_parser` and `run`."""
+"""The subcommands of `limb`, one module each, with `add_parser` and `run`, and what they share.
+
+What is wrong with an option ends in a FieldError whose field is the option's `dest`; `limb_nodes.cli` shows the option.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from limb_nodes.errors import FieldError
+
+PICTURES = (".png", ".pdf", ".svg")
+
+
+def output_file(field: str, name: str, endings: tuple[str, ...] = PICTURES) -> Path:
+    """The path of a file to write. Raises FieldError if its ending is another, or its folder is not there."""
+    path = Path(name)
+    if path.suffix.lower() not in endings:
+        raise FieldError(field, f"is {name}; a name that ends in {' or '.join(endings)} is needed")
+    if not path.parent.is_dir():
+        raise FieldError(field, f"is {name}; a folder that exists is needed, unlike {path.parent}")
+    return path
+
+
+@contextmanager
+def writing(field: str) -> Iterator[None]:
+    """Turn the OSError of a file that cannot be written into a FieldError."""
+    try:
+        yield
+    except OSError as problem:
+        raise FieldError(
+            field, f"is {problem.filename}, which cannot be written: {problem.strerror or problem}"
+        ) from None

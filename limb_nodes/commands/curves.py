@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from limb_nodes.analysis.curves import characteristics
+from limb_nodes.commands import PICTURES, output_file, writing
 from limb_nodes.errors import UserError
 from limb_nodes.model import load_limb
-
-PICTURES = (".png", ".pdf", ".svg")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -26,19 +24,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Draw, and say what was drawn."""
-    out = Path(args.out)
-    if out.suffix.lower() not in PICTURES:
-        raise UserError(f"--out {args.out}: the name of a picture ends in {', '.join(PICTURES)}")
+    out = output_file("out", args.out)
     limb = load_limb(args.limb)
     if not limb.muscles:
-        raise UserError(f"{args.limb}: muscles is empty; a limb without muscles has no characteristics")
+        raise UserError(f"{args.limb}: muscles is empty; at least one is needed, for only muscles have characteristics")
     panels = characteristics(limb)
     from limb_nodes.analysis.draw_curves import draw
 
-    try:
+    with writing("out"):
         draw(panels, limb.name, out)
-    except OSError as problem:
-        raise UserError(f"--out {args.out}: cannot be written: {problem.strerror or problem}") from None
     for panel in panels:
         print(f"{panel.title}: {', '.join(panel.laws)}")
     print(f"picture: {out}")

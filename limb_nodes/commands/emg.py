@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from limb_nodes.bags.folder import refuse_existing
-from limb_nodes.errors import UserError
+from limb_nodes.errors import FieldError
 from limb_nodes.signals.emg import EnvelopeOptions, Envelopes, envelopes, write_envelopes
 from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
 from limb_nodes.signals.recording import RAW_TOPIC, read_recording
@@ -24,26 +24,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("file", help="tab- or comma-separated text with named columns, or a bag")
     parser.add_argument("-o", "--out", required=True, metavar="BAG", help="folder to write; must not exist")
     reading = parser.add_argument_group("what is read")
-    reading.add_argument("--rate", type=float, metavar="HZ", help="samples per second, where the file does not say")
+    reading.add_argument("--rate", type=float, metavar="HZ", help="samples per second, if the file does not say")
     reading.add_argument("--topic", default=RAW_TOPIC, help=f"topic of the raw EMG in a bag (default {RAW_TOPIC})")
     reading.add_argument(
-        "--channel", action="append", default=[], metavar="COLUMN[=NAME]",
+        "--channel", dest="channels", action="append", default=[], metavar="COLUMN[=NAME]",
         help="take this EMG column, under another name if given; repeatable (default: all in V, mV, uV or no unit)",
     )  # fmt: skip
     reading.add_argument(
-        "--angle", action="append", default=[], metavar="COLUMN[=NAME]",
+        "--angle", dest="angles", action="append", default=[], metavar="COLUMN[=NAME]",
         help="keep this column of angles, under another name if given; repeatable (default: all in deg or rad)",
     )  # fmt: skip
     reading.add_argument("--skip", action="append", default=[], metavar="COLUMN", help="leave out; repeatable")
     steps = parser.add_argument_group("steps")
     band = steps.add_mutually_exclusive_group()
     band.add_argument(
-        "--band-pass", nargs=2, type=float, default=DEFAULT_BAND, metavar=("LOW", "HIGH"),
+        "--band-pass", dest="band", nargs=2, type=float, default=DEFAULT_BAND, metavar=("LOW", "HIGH"),
         help=f"edges in Hz (default {DEFAULT_BAND[0]:g} {DEFAULT_BAND[1]:g})",
     )  # fmt: skip
     band.add_argument("--no-band-pass", action="store_true", help="leave the band-pass out")
     steps.add_argument(
-        "--band-pass-order", type=int, default=DEFAULT_ORDER, metavar="N",
+        "--band-pass-order", dest="band_order", type=int, default=DEFAULT_ORDER, metavar="N",
         help=f"order of both passes together, even (default {DEFAULT_ORDER})",
     )  # fmt: skip
     steps.add_argument("--no-rectify", action="store_true", help="leave the full-wave rectification out")
@@ -71,42 +71,42 @@ def run(args: argparse.Namespace) -> int:
     """Read, process, write, and print what was done. Raises UserError before anything is written."""
     refuse_existing(Path(args.out))
     options = EnvelopeOptions(
-        band=None if args.no_band_pass else (args.band_pass[0], args.band_pass[1]),
-        band_order=args.band_pass_order,
+        band=None if args.no_band_pass else (args.band[0], args.band[1]),
+        band_order=args.band_order,
         rectify=not args.no_rectify,
         low_pass=None if args.no_low_pass else args.low_pass,
         low_pass_order=args.low_pass_order,
         rest=args.rest,
         resample=args.resample,
-        maximum={column: _float("--maximum", column, value) for column, value in _pairs("--maximum", args.maximum)},
-        channels=dict(_pairs("--channel", args.channel, same=True)),
-        angles=dict(_pairs("--angle", args.angle, same=True)),
+        maximum={column: _float("maximum", column, value) for column, value in _pairs("maximum", args.maximum)},
+        channels=dict(_pairs("channels", args.channels, same=True)),
+        angles=dict(_pairs("angles", args.angles, same=True)),
         skip=tuple(args.skip),
     )
-    found = envelopes(read_recording(args.file, rate=args.rate, topic=args.topic), options)
-    write_envelopes(found, args.out, options)
-    print(summary(found, args.out))
+    result = envelopes(read_recording(args.file, rate=args.rate, topic=args.topic), options)
+    write_envelopes(result, args.out, options)
+    print(summary(result, args.out))
     return 0
 
 
-def summary(found: Envelopes, out: str) -> str:
-    """A table of the channels, and where the bag is."""
+def summary(result: Envelopes, out: str) -> str:
+    """A table of the channels, and the path of the bag."""
     rows = [("channel", "as", "samples", "gaps bridged", "longest", "maximum", "rest level", "above maximum")]
-    samples = str(len(found.values))
-    for channel in found.channels:
+    samples = str(len(result.values))
+    for channel in result.channels:
         unit = f" {channel.unit}" if channel.unit else ""
         rows.append(
             (channel.column, channel.name, samples, _gaps(channel.gaps), _longest(channel.gaps),
              f"{channel.maximum:.4g}{unit}", f"{channel.rest:.3g}{unit}", str(channel.clipped))
         )  # fmt: skip
-    for angle in found.angle_channels:
+    for angle in result.angle_channels:
         rows.append(
             (angle.column, f"{angle.name} (angle)", samples, _gaps(angle.gaps), _longest(angle.gaps), "", "", "")
         )
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    lines += [f"note: {note}" for note in found.notes]
-    lines.append(f"rate {found.rate:g} Hz, {(len(found.values) - 1) / found.rate:g} s, in {out}")
+    lines += [f"note: {note}" for note in result.notes]
+    lines.append(f"rate {result.rate:g} Hz, {(len(result.values) - 1) / result.rate:g} s, in {out}")
     return "\n".join(lines)
 
 
@@ -118,7 +118,7 @@ def _longest(gaps: Gaps) -> str:
     return f"{gaps.longest} samples" if gaps.count else "-"
 
 
-def _pairs(option: str, entries: Sequence[str], same: bool = False) -> list[tuple[str, str]]:
+def _pairs(field: str, entries: Sequence[str], same: bool = False) -> list[tuple[str, str]]:
     """Split NAME=VALUE; with `same`, NAME alone stands for NAME=NAME."""
     pairs: list[tuple[str, str]] = []
     for entry in entries:
@@ -126,15 +126,15 @@ def _pairs(option: str, entries: Sequence[str], same: bool = False) -> list[tupl
         if not equals and same:
             value = name
         if not name or not value:
-            raise UserError(f"{option} {entry}: must be COLUMN{'[=NAME]' if same else '=VALUE'}")
+            raise FieldError(field, f"is {entry}; COLUMN{'[=NAME]' if same else '=VALUE'} is needed")
         if name in dict(pairs):
-            raise UserError(f"{option} {entry}: column '{name}' is named twice; once is allowed")
+            raise FieldError(field, f"names {name!r} twice; different columns are needed")
         pairs.append((name, value))
     return pairs
 
 
-def _float(option: str, name: str, text: str) -> float:
+def _float(field: str, name: str, text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise UserError(f"{option} {name}={text}: '{text}' is not a number") from None
+        raise FieldError(field, f"of {name} is {text!r}; a number > 0 is needed") from None

@@ -5,16 +5,20 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limb_nodes.errors import UserError
+from limb_nodes.commands import PICTURES, output_file, writing
+from limb_nodes.errors import FieldError
+from limb_nodes.foundation.parameter import Parameter
 
 if TYPE_CHECKING:
     from limb_nodes.signals.activation import Activation
     from limb_nodes.solve.bench import Course, MuscleBench
 
-PICTURES = (".png", ".pdf", ".svg")
+
+LENGTH = Parameter("length", "m", "from the muscle's origin to its insertion", above=0.0)
+SPEED = Parameter("speed", "m/s", "of both ways, towards the second length", above=0.0)
+START = Parameter("start", "s", "when the length begins to change", minimum=0.0)
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -54,6 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--straight", action="store_true", help="follow --lengths along straight lines")
     parser.add_argument(
         "--activation",
+        dest="source",
         default="1",
         metavar="SOURCE",
         help="a number, or as for limb simulate: envelope bag, CSV, waveform YAML, constants (default 1)",
@@ -74,11 +79,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Solve, draw, write, print a summary."""
-    picture, table = checked_output("--out", args.out, PICTURES), checked_output("--csv", args.csv, (".csv",))
-    if not (math.isfinite(args.rate) and args.rate > 0.0):
-        raise UserError(f"--rate is {args.rate:g}; a number > 0 in Hz is needed")
+    picture = output_file("out", args.out) if args.out else None
+    table = output_file("csv", args.csv, (".csv",)) if args.csv else None
+    Parameter("rate", "Hz", "samples per second", above=0.0).check(args.rate)
     if args.straight and not args.lengths:
-        raise UserError("--straight: goes with --lengths FILE")
+        raise FieldError("lengths", "is missing; the file that is to be followed straight is needed")
 
     from limb_nodes.model import load_limb
     from limb_nodes.solve.bench import MuscleBench
@@ -98,15 +103,14 @@ def run(args: argparse.Namespace) -> int:
 
     from limb_nodes.analysis.bench_table import plain, text, write_csv
 
-    try:
-        if picture:
-            from limb_nodes.analysis.bench_picture import draw
+    if picture:
+        from limb_nodes.analysis.bench_picture import draw
 
+        with writing("out"):
             draw(record, f"{args.muscle} of {limb.name} on the bench", picture)
-        if table:
+    if table:
+        with writing("csv"):
             write_csv(record, table)
-    except OSError as problem:
-        raise UserError(f"{problem.filename}: cannot be written: {problem.strerror or problem}") from None
     if args.json:
         head = {"limb": limb.name, "limb_file": limb.file, "muscle": args.muscle, "notes": list(activation.notes)}
         print(json.dumps({**head, **plain(record)}, indent=1))
@@ -121,67 +125,53 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def checked_output(option: str, name: str | None, endings: tuple[str, ...]) -> Path | None:
-    """The path of a file to write; UserError where it cannot be one."""
-    if name is None:
-        return None
-    path = Path(name)
-    if path.suffix.lower() not in endings:
-        raise UserError(f"{option} {name}: the name must end in {', '.join(endings)}")
-    if not path.parent.is_dir():
-        raise UserError(f"{option} {name}: there is no folder {path.parent}")
-    return path
-
-
 def course_of(args: argparse.Namespace, bench: MuscleBench) -> Course:
     """The muscle-tendon length that was asked for."""
-    import numpy as np
-
     from limb_nodes.signals.length_course import read_length_course
     from limb_nodes.solve.bench import Course, isokinetic, isometric, ramp
 
     if args.lengths:
         time, length = read_length_course(args.lengths)
         return Course(time, length, smooth=not args.straight)
-    for option in ("isometric", "ramp", "isokinetic"):
-        given = getattr(args, option)
-        if given is None:
-            continue
-        numbers = np.atleast_1d(given)
-        named = [("length", numbers[:1])] if option == "isometric" else [("length", numbers[:2])]
-        if option == "isokinetic":
-            named.append(("speed", numbers[2:3]))
-        for what, values in named:
-            for value in values:
-                if not (math.isfinite(value) and value > 0.0):
-                    raise UserError(f"--{option}: {what} {value:g}; a number > 0 is needed")
-        if option == "isometric":
-            return isometric(given)
-        start = given[3] if option == "isokinetic" else given[2]
-        if not (math.isfinite(start) and start >= 0.0):
-            raise UserError(f"--{option}: start {start:g}; a number >= 0 in s is needed")
-        if option == "ramp":
-            if not (math.isfinite(given[3]) and given[3] > start):
-                raise UserError(f"--ramp: end {given[3]:g}; a number > the start ({start:g}) in s is needed")
-            return ramp(*given)
-        if given[0] == given[1]:
-            raise UserError(f"--isokinetic: both lengths are {given[0]:g}; two different lengths in m are needed")
-        return isokinetic(*given)
+    if args.isometric is not None:
+        check("isometric", LENGTH, args.isometric)
+        return isometric(args.isometric)
+    if args.ramp:
+        begin, end = args.ramp[2:]
+        check("ramp", LENGTH, *args.ramp[:2])
+        check("ramp", START, begin)
+        check("ramp", Parameter("end", "s", "end of the ramp", above=begin), end)
+        return ramp(*args.ramp)
+    if args.isokinetic:
+        first, last, speed, begin = args.isokinetic
+        check("isokinetic", LENGTH, first, last)
+        check("isokinetic", SPEED, speed)
+        check("isokinetic", START, begin)
+        if first == last:
+            raise FieldError("isokinetic", f"lengths are both {first:g}; two different lengths in m are needed")
+        return isokinetic(*args.isokinetic)
     return isometric(bench.optimal_length())
+
+
+def check(option: str, parameter: Parameter, *values: float) -> None:
+    """Raise FieldError if one of the numbers that an option takes is out of range."""
+    for value in values:
+        if not parameter.accepts(value):
+            raise FieldError(option, f"{parameter.name} is {value:g}; {parameter.allowed()} is needed")
 
 
 def activation_of(args: argparse.Namespace, bench: MuscleBench, course: Course) -> Activation:
     """The muscle's activation over the duration that was asked for, or over all that is prescribed."""
     from limb_nodes.signals.activation import load_activation
 
-    source, name = args.activation, bench.muscle.name
+    source, name = args.source, bench.muscle.name
     try:
         number = float(source)
     except ValueError:
         pass
     else:
         if not 0.0 <= number <= 1.0:
-            raise UserError(f"--activation {source}: a number in [0, 1] is needed")
+            raise FieldError("source", f"is {source}; a number in [0, 1] is needed")
         source = f"{name}={source}"
     duration = args.duration
     if duration is None and len(course.time) > 1:

@@ -21,7 +21,12 @@ def add_parser(subparsers: Any) -> None:
         "--topic", default="emg_envelope", metavar="NAME", help="topic of the bag to play (default emg_envelope)"
     )
     parser.add_argument(
-        "--rate-factor", type=float, default=1.0, metavar="X", help="recorded seconds per second (default 1)"
+        "--rate-factor",
+        dest="pace",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="recorded seconds per second (default 1)",
     )
     parser.add_argument("--loop", action="store_true", help="begin again at the end, until Ctrl-C")
     parser.add_argument(
@@ -35,10 +40,10 @@ def run(args: argparse.Namespace) -> int:
     """Play, show progress, print a summary."""
     from tqdm import tqdm
 
-    from limb_nodes.nodes.play import TOPIC, play, read_recording
+    from limb_nodes.nodes.play import TOPIC, play, read_messages
 
-    recording = read_recording(args.bag, args.topic)
-    total = math.inf if args.loop else recording.times[-1]
+    messages = read_messages(args.bag, args.topic)
+    total = math.inf if args.loop else messages.times[-1]
     with tqdm(total=total, unit="s", disable=not sys.stderr.isatty(), leave=False,
               bar_format="{percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s") as bar:  # fmt: skip
 
@@ -46,15 +51,15 @@ def run(args: argparse.Namespace) -> int:
             bar.update(reached - bar.n)
 
         played = play(
-            recording,
-            pace=args.rate_factor,
+            messages,
+            pace=args.pace,
             loop=args.loop,
             wait=args.wait,
             namespace=args.namespace,
             progress=show,
         )
-    where = f"/{args.namespace.strip('/')}/{TOPIC}" if args.namespace else f"/{TOPIC}"
-    print(f"messages  {played.messages} of {recording.topic} on {where}")
+    topic = f"/{args.namespace.strip('/')}/{TOPIC}" if args.namespace else f"/{TOPIC}"
+    print(f"messages  {played.messages} of {messages.topic} on {topic}")
     print(f"wall time {played.seconds:.2f} s, the latest message {played.latest * 1e3:.1f} ms late")
     if played.interrupted:
         print("interrupted")

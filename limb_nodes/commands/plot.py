@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from limb_nodes.errors import UserError
+from limb_nodes.commands import output_file
+from limb_nodes.errors import FieldError
+from limb_nodes.foundation.parameter import Parameter
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -27,27 +28,22 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="BAG",
         help="draw the angles recorded in this bag, such as `limb emg` writes, beside the simulated ones",
     )
-    parser.add_argument("--namespace", default="", metavar="NS", help="of the limb, where the bag holds several")
+    parser.add_argument("--namespace", default="", metavar="NS", help="of the limb, if the bag holds several")
     parser.add_argument("--dpi", type=float, default=150.0, help="dots per inch of a .png (default 150)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw, and say where the picture is."""
-    from limb_nodes.analysis.plot.picture import LARGEST_DPI, SUFFIXES, picture, save
+    """Draw, and print the path of the picture."""
+    from limb_nodes.analysis.plot.picture import LARGEST_DPI, picture, save
     from limb_nodes.analysis.plot.series import read_run
 
-    out = Path(args.out)
-    if out.suffix.lower() not in SUFFIXES:
-        raise UserError(f"--out {out}: must end in {', '.join(SUFFIXES)}")
-    if not 10 <= args.dpi <= LARGEST_DPI:
-        raise UserError(f"--dpi {args.dpi:g}: must be a number from 10 to {LARGEST_DPI}")
+    out = output_file("out", args.out)
+    Parameter("dpi", "1", "dots per inch", minimum=10, maximum=LARGEST_DPI).check(args.dpi)
     if out.is_dir() or (out.exists() and not args.force):
-        raise UserError(f"--out {out}: exists already; give another name, or --force to overwrite a picture")
-    if not out.parent.is_dir():
-        raise UserError(f"--out {out}: no folder {out.parent}; must be in a folder that exists")
-    found = read_run(args.bag, namespace=args.namespace, start=args.start, end=args.end, reference=args.reference)
-    save(picture(found), out, args.dpi)
-    for note in found.notes:
+        raise FieldError("out", f"is {out}, which exists already; a new name is needed, or --force")
+    shown = read_run(args.bag, namespace=args.namespace, start=args.start, end=args.end, reference=args.reference)
+    save(picture(shown), out, args.dpi)
+    for note in shown.notes:
         print(f"note: {note}")
-    print(f"picture  {out} ({found.start:g} to {found.end:g} s)")
+    print(f"picture  {out} ({shown.start:g} to {shown.end:g} s)")
     return 0

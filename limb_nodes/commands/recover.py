@@ -18,16 +18,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Recover, and print what was found."""
+    """Recover, and print what the new bag holds."""
     from limb_nodes.bags.recover import recover
 
-    found = recover(args.bag, args.out)
-    width = max(len(topic) for topic in found.counts)
-    for topic, count in sorted(found.counts.items()):
+    recovered = recover(args.bag, args.out)
+    width = max(len(topic) for topic in recovered.counts)
+    for topic, count in sorted(recovered.counts.items()):
         print(f"{topic.ljust(width)}  {count} message{'s' if count != 1 else ''}")
-    if found.truncated:
+    if recovered.truncated:
         print("the file is damaged or ends within a record; what came after that place is lost")
     else:
         print("nothing is lost")
-    print(f"bag {found.path}, up to {found.end_ns * 1e-9:g} s")
+    print(f"bag {recovered.path}, up to {recovered.end_ns * 1e-9:g} s")
     return 0

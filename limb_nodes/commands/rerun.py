@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     missing = [key for key in ("limb", "rate", "parameters") if key not in info]
     if missing:
         raise UserError(
-            f"{args.bag}: run_info has no {', '.join(missing)}; a bag of limb run or limb simulate is needed"
+            f"{args.bag}: {', '.join(missing)} is missing in run_info; a bag of limb run or limb simulate is needed"
         )
     with tempfile.TemporaryDirectory(prefix="limb_rerun_") as folder:
         limb = unpack(Path(folder), info)
@@ -68,7 +68,7 @@ def unpack(folder: Path, info: dict[str, Any]) -> Path:
     for name, text in (info.get("laws") or {}).items():
         path = (folder / name).resolve()
         if not path.is_relative_to(folder.resolve()):
-            raise UserError(f"the bag's law file {name} lies outside its folder")
+            raise UserError(f"run_info: the law file is {name}; a path within the folder of the limb is needed")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     limb = folder / Path(info.get("limb_file") or "limb.yaml").name

@@ -19,6 +19,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
     parser.add_argument(
         "--activation",
+        dest="source",
         default="",
         metavar="SOURCE",
         help="envelope bag, CSV, waveform YAML or constants (flexor=0.9,extensor=0); without it, in real time, "
@@ -38,16 +39,15 @@ def run(args: argparse.Namespace) -> int:
     """Run, show progress, print a summary."""
     from tqdm import tqdm
 
-    from limb_nodes.errors import UserError
+    from limb_nodes.foundation.parameter import Parameter
     from limb_nodes.nodes.session import Run, checked, run_in_one_process, run_in_processes
 
-    if args.duration is not None and not args.duration > 0.0:
-        raise UserError(f"--duration is {args.duration:g}; a number > 0 in s is needed")
-    if not 1 <= args.state_every <= 1_000_000:
-        raise UserError(f"--state-every is {args.state_every}; a whole number from 1 to 1000000 is needed")
-    wanted = Run(
+    if args.duration is not None:
+        Parameter("duration", "s", "simulated time", above=0.0).check(args.duration)
+    Parameter("state_every", "1", "ticks", minimum=1, maximum=1e6, integer=True).check(args.state_every)
+    settings = Run(
         limb=args.limb,
-        source=args.activation,
+        source=args.source,
         rate=args.rate,
         duration=args.duration or 0.0,
         out=args.out,
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         state_every=args.state_every,
         command=shlex.join(["limb", *sys.argv[1:]]),
     )
-    ready, final = checked(wanted)
+    ready, final = checked(settings)
     with tqdm(
         total=None if final is None else final + 1, unit="tick", disable=not sys.stderr.isatty(), leave=False
     ) as bar:

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from limb_nodes.errors import UserError
+from limb_nodes.foundation.parameter import Parameter
 
 
 def add_parser(subparsers: Any) -> None:
@@ -23,6 +23,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
     parser.add_argument(
         "--activation",
+        dest="source",
         required=True,
         metavar="SOURCE",
         help="envelope bag, CSV, waveform YAML or constants (flexor=0.9,extensor=0)",
@@ -40,11 +41,11 @@ def run(args: argparse.Namespace) -> int:
     from limb_nodes.signals.activation import load_activation
 
     limb = load_limb(args.limb)
-    if args.tolerance is not None and not 1e-14 <= args.tolerance <= 1e-2:
-        raise UserError(f"--tolerance is {args.tolerance:g}; a number from 1e-14 to 1e-2 is needed")
+    if args.tolerance is not None:
+        Parameter("tolerance", "1", "relative error per step", minimum=1e-14, maximum=1e-2).check(args.tolerance)
     if args.out:
         refuse_existing(Path(args.out))
-    activation = load_activation(args.activation, limb.muscle_names, args.rate, args.duration)
+    activation = load_activation(args.source, limb.muscle_names, args.rate, args.duration)
 
     from limb_nodes.solve.whole import TOLERANCE, WholeModel
 
@@ -71,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
             "laws": user_sources(limb),
             "command": shlex.join(["limb", *sys.argv[1:]]),
             "rate": args.rate,
-            "parameters": {"simulate": {"activation": args.activation, "tolerance": args.tolerance or TOLERANCE}},
+            "parameters": {"simulate": {"activation": args.source, "tolerance": args.tolerance or TOLERANCE}},
             "versions": versions(),
             "seed": None,
         }

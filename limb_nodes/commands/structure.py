@@ -6,19 +6,18 @@ import argparse
 import json
 import shutil
 import sys
-from pathlib import Path
 
 from limb_nodes.analysis.structure import TITLES, analyse
 from limb_nodes.analysis.structure.plain import plain
 from limb_nodes.analysis.structure.table import report
-from limb_nodes.errors import UserError
+from limb_nodes.commands import PICTURES, output_file, writing
+from limb_nodes.errors import FieldError
 from limb_nodes.model import load_limb
 
 # For terminals without these characters.
 PLAIN = str.maketrans({
     "⊗": "O", "×": "x", "·": ".", "→": ">", "α": "alpha", "β": "beta", "θ": "theta", "ω": "omega",
 })  # fmt: skip
-PICTURES = (".png", ".pdf", ".svg")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -27,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "structure",
         help="degrees of freedom, index and structure matrices of a limb's equations",
         description="Count the equations and unknowns of every level of a limb, and find from their structure the "
-        "degrees of freedom, the differential index, and which equations must be solved together. Exit status 1 where "
+        "degrees of freedom, the differential index, and which equations must be solved together. Exit status 1 if "
         "what is solved (all but the original form of the limb) is singular or has an index above 1.",
     )
     parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
@@ -37,21 +36,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print and draw; 1 where what is solved cannot be solved as it stands."""
-    out = Path(args.out) if args.out else None
-    if out and out.suffix.lower() not in PICTURES:
-        raise UserError(f"--out {args.out}: the name of a picture ends in {', '.join(PICTURES)}")
+    """Print and draw; 1 if what is solved cannot be solved as it stands."""
+    out = output_file("out", args.out) if args.out else None
     limb = load_limb(args.limb)
     findings = analyse(limb, args.level)
     if not findings:
-        raise UserError(f"{args.limb}: --level {args.level}: no muscle of this limb has this level")
+        raise FieldError("level", f"is {args.level}; a level that a muscle of this limb has is needed", args.limb)
     if out:
         from limb_nodes.analysis.structure.picture import draw
 
-        try:
+        with writing("out"):
             draw(findings, limb.name, out)
-        except OSError as problem:
-            raise UserError(f"--out {args.out}: cannot be written: {problem.strerror or problem}") from None
     if args.json:
         text = json.dumps(plain(findings, limb.name, args.limb), indent=1)
     else:
@@ -63,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def printable(text: str) -> str:
-    """The text, with plain letters where standard output cannot show its symbols."""
+    """The text, with plain letters if standard output cannot show its symbols."""
     encoding = sys.stdout.encoding or "utf-8"
     try:
         text.encode(encoding)

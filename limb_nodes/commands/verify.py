@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limb_nodes.errors import UserError
+from limb_nodes.commands import writing
+from limb_nodes.errors import FieldError
 
 if TYPE_CHECKING:
     from limb_nodes.analysis.course import Course
@@ -30,7 +31,7 @@ def add_parser(subparsers: Any) -> None:
         "verify",
         help="check the model against the cases of the report's section 3.3",
         description="Run every case by the whole-model solve and by the graph of nodes at 1 kHz, and compare what "
-        "they show with what mechanics expects. Exit status 1 where a quantity is out of its tolerance.",
+        "they show with what mechanics expects. Exit status 1 if a quantity is out of its tolerance.",
     )
     way = parser.add_mutually_exclusive_group()
     way.add_argument("--whole", action="store_true", help="only the whole-model solve")
@@ -44,13 +45,13 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the cases, print, draw; 1 where a quantity is not as expected."""
+    """Run the cases, print, draw; 1 if a quantity is not as expected."""
     from limb_nodes.analysis.verification import CASES, examine
 
     cases = chosen(args.case, CASES)
     folder = Path(args.limbs) if args.limbs else None
     limbs = {case.name: case.build(folder) for case in cases}
-    pictures = made(args.figures)
+    pictures = make_folder(args.figures) if args.figures else None
     ways = ("whole",) if args.whole else ("graph",) if args.graph else WAYS
     courses: dict[str, dict[str, Course]] = {case.name: {} for case in cases}
     findings: list[Finding] = []
@@ -81,24 +82,20 @@ def chosen(names: Sequence[str] | None, cases: Sequence[Case]) -> list[Case]:
     known = [case.name for case in cases]
     for name in names or ():
         if name not in known:
-            raise UserError(f"--case is {name!r}; allowed: {', '.join(known)}")
+            raise FieldError("case", f"is {name!r}; one of {', '.join(known)} is needed")
     return [case for case in cases if not names or case.name in names]
 
 
-def made(folder: str | None) -> Path | None:
+def make_folder(folder: str) -> Path:
     """The folder for the figures, made if need be."""
-    if folder is None:
-        return None
     path = Path(folder)
-    try:
+    with writing("figures"):
         path.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise UserError(f"--figures {folder}: cannot be made: {problem.strerror or problem}") from None
     return path
 
 
 def run_case(case: Case, limb: Limb, way: str) -> Course | None:
-    """Run a case one way; None, and a line, where the equations cannot be solved."""
+    """Run a case one way; None, and a line, if the equations cannot be solved."""
     from limb_nodes.analysis.verification import solve_whole
     from limb_nodes.solve.whole import SolveError
 
@@ -121,7 +118,7 @@ def solve_graph(case: Case, limb: Limb) -> Course:
         file, source, bag = (Path(folder) / name for name in ("limb.yaml", "activation.csv", "bag"))
         write_limb(limb, file)
         write_activation(case, limb, source)
-        wanted = Run(
+        settings = Run(
             limb=str(file),
             source=str(source),
             rate=RATE,
@@ -133,7 +130,7 @@ def solve_graph(case: Case, limb: Limb) -> Course:
             command=shlex.join(["limb", *sys.argv[1:]]),
         )
         try:
-            outcome = run_in_one_process(wanted, lambda tick: None)
+            outcome = run_in_one_process(settings, lambda tick: None)
         finally:
             for number, handler in handlers.items():
                 signal.signal(number, handler)
@@ -165,14 +162,14 @@ def write_activation(case: Case, limb: Limb, path: Path) -> None:
 
 def table(cases: Sequence[Case], ways: Sequence[str], findings: Sequence[Finding]) -> str:
     """Expected, found, tolerance and verdict of every quantity."""
-    found = {(f.case.name, f.quantity.name, f.solver): f for f in findings}
+    by_name = {(f.case.name, f.quantity.name, f.solver): f for f in findings}
     width = max(len(quantity.name) for case in cases for quantity in case.quantities)
     head = f"  {'quantity':{width}} {'expected':>12}" + "".join(f" {way:>12}" for way in ways)
     lines = [f"{head} {'tolerance':>10}  verdict"]
     for case in cases:
         lines.append(f"case {case.name}: {case.set_up}")
         for quantity in case.quantities:
-            of = [found[case.name, quantity.name, way] for way in ways]
+            of = [by_name[case.name, quantity.name, way] for way in ways]
             values = "".join(f" {number(finding.found):>12}" for finding in of)
             failed = [finding.solver for finding in of if not finding.passed]
             verdict = f"FAILED ({', '.join(failed)})" if failed else "passed"

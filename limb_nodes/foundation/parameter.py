@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 
+from limb_nodes.errors import FieldError
+
 
 def is_finite(value: float) -> bool:
     """Whether a number, an integer of any length included, is one of the finite floats."""
@@ -57,3 +59,10 @@ class Parameter:
             and (self.below is None or value < self.below)
             and (not self.integer or value == int(value))
         )
+
+    def check(self, value: float) -> float:
+        """The value, which is within the bounds. Raises FieldError that says what is allowed."""
+        if not self.accepts(value):
+            shown = str(value) if isinstance(value, int) else f"{value:g}"
+            raise FieldError(self.name, f"is {shown}; {self.allowed()} is needed")
+        return value

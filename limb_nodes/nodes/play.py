@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -17,12 +16,15 @@ from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
 from limb_nodes.bags.read import BagReader
-from limb_nodes.errors import UserError
+from limb_nodes.errors import FieldError, UserError
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.nodes.qos import EVERY
 from limb_nodes.nodes.running import Interrupt, acknowledged, check_namespace
 
 TOPIC = "emg_envelope"
 TYPE = "limb_msgs/msg/MuscleActivation"
+PACE = Parameter("pace", "1", "recorded seconds per second", above=0.0)
+WAIT = Parameter("wait", "s", "how long to wait for a subscriber", minimum=0.0)
 # Longest sleep, so that Ctrl-C is heard soon (s).
 NAP = 0.05
 # How long the last message may take to arrive (s).
@@ -32,7 +34,7 @@ NO_LISTENERS = {"recorder", "_NODE_NAME_UNKNOWN_"}
 
 
 @dataclass(frozen=True)
-class Recording:
+class TimedMessages:
     """Serialised messages and when to publish them.
 
     topic: its name in the bag. times: s after the first message [messages]. messages: CDR.
@@ -55,7 +57,7 @@ class Played:
     interrupted: bool
 
 
-def read_recording(bag: str, topic: str = TOPIC) -> Recording:
+def read_messages(bag: str, topic: str = TOPIC) -> TimedMessages:
     """The messages of a bag's topic. Raises UserError."""
     with BagReader(bag) as reader:
         rows = list(reader.read_raw(topic))
@@ -66,11 +68,11 @@ def read_recording(bag: str, topic: str = TOPIC) -> Recording:
     if not rows:
         raise UserError(f"{bag}: topic {name} has no message")
     start = rows[0][0]
-    return Recording(name, [(stamp - start) * 1e-9 for stamp, _ in rows], [data for _, data in rows])
+    return TimedMessages(name, [(stamp - start) * 1e-9 for stamp, _ in rows], [data for _, data in rows])
 
 
 def play(
-    recording: Recording,
+    recording: TimedMessages,
     *,
     pace: float = 1.0,
     loop: bool = False,
@@ -81,11 +83,10 @@ def play(
     """Publish a recording on `emg_envelope`.
 
     pace: recorded seconds per second. wait: for a subscriber, s; 0 starts at once. progress: called with the
-    recorded time reached. Raises UserError where nobody subscribes in time.
+    recorded time reached. Raises FieldError if pace or wait are out of range, or if nobody subscribes in time.
     """
-    for name, value, lowest in ("--rate-factor", pace, "> 0"), ("--wait", wait, ">= 0"):
-        if not (math.isfinite(value) and (value > 0.0 or (value == 0.0 and lowest == ">= 0"))):
-            raise UserError(f"{name} is {value:g}; a number {lowest} is needed")
+    PACE.check(pace)
+    WAIT.check(wait)
     check_namespace(namespace)
     interrupt = Interrupt()
     context = Context()
@@ -130,8 +131,9 @@ def await_listener(node: Node, publisher: Publisher, wait: float, interrupt: Int
         if set(listeners) - NO_LISTENERS and publisher.get_subscription_count() >= len(listeners):
             return
         if time.monotonic() > end:
-            raise UserError(
-                f"nobody subscribes {topic} after {wait:g} s; start the nodes in mode realtime without a source, "
-                "or give --wait 0 to play at once"
+            raise FieldError(
+                "wait",
+                f"is {wait:g}, and nobody subscribes {topic} within {wait:g} s; nodes in mode realtime without a "
+                "source are needed, or 0 to play at once",
             )
         time.sleep(NAP)

@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_namespace import validate_namespace
 
-from limb_nodes.errors import UserError
+from limb_nodes.errors import FieldError, UserError
 
 # The executor is asked for one event at a time with a time-out: without one it hangs when idle.
 SPIN_TIMEOUT = 0.05
@@ -44,14 +44,15 @@ def spin(executor: Executor, done: Callable[[], bool]) -> None:
 
 
 def check_namespace(namespace: str) -> None:
-    """Raise UserError where ROS would not have a namespace."""
+    """Raise FieldError if ROS would not have a namespace."""
     full = namespace if namespace.startswith("/") else f"/{namespace}"
     try:
         validate_namespace(full)
     except InvalidNamespaceException:
-        raise UserError(
-            f"--namespace is {namespace!r}; words of letters, digits and _, none with a digit in front, "
-            "with / between them are needed"
+        raise FieldError(
+            "namespace",
+            f"is {namespace!r}; words of letters, digits and _, none with a digit in front, "
+            "with / between them are needed",
         ) from None
 
 

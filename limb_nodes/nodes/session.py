@@ -20,7 +20,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Int64
 
-from limb_nodes.errors import UserError
+from limb_nodes.errors import FieldError, UserError
 from limb_nodes.nodes.activation_input import ActivationInput
 from limb_nodes.nodes.base import NODES
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
@@ -157,11 +157,12 @@ def watching(started: float | None) -> bool:
 
 
 def refuse_company(node: Any) -> None:
-    """Raise UserError where another limb publishes on the same topics."""
+    """Raise FieldError if another limb publishes on the same topics."""
     if node.count_publishers("joint_states") > 1:
-        raise UserError(
-            f"{node.resolve_topic_name('joint_states')} is published by another run too; give this one a --namespace, "
-            "or another ROS_DOMAIN_ID"
+        raise FieldError(
+            "namespace",
+            f"is {node.get_namespace()}, where another run publishes {node.resolve_topic_name('joint_states')} too; "
+            "another one, or another ROS_DOMAIN_ID, is needed",
         )
 
 
@@ -285,7 +286,7 @@ def stop(children: dict[str, Child]) -> None:
 
 
 def refuse_neighbours(context: Context, namespace: str) -> None:
-    """Raise UserError where nodes of another run use the same topics: each would take the other's messages."""
+    """Raise FieldError if nodes of another run use the same topics: each would take the other's messages."""
     full = f"/{namespace.strip('/')}"
     probe = rclpy.create_node("limb_run_probe", context=context, namespace=full, start_parameter_services=False)
     try:
@@ -296,9 +297,10 @@ def refuse_neighbours(context: Context, namespace: str) -> None:
             if not found and probe.count_publishers("joint_states"):
                 found = ["limb_dynamics"]
             if found:
-                raise UserError(
-                    f"a node {found[0]} runs already in namespace {full}, perhaps of another run; give --namespace, "
-                    "or set ROS_DOMAIN_ID, to another one"
+                raise FieldError(
+                    "namespace",
+                    f"is {full}, where a node {found[0]} runs already, perhaps of another run; another one, or another "
+                    "ROS_DOMAIN_ID, is needed",
                 )
             time.sleep(0.02)
     finally:
@@ -341,14 +343,14 @@ def checked(run: Run) -> tuple[Run, int | None]:
     check_namespace(run.namespace)
     refuse_existing(Path(run.out))
     if run.duration and not 1 / run.rate <= run.duration <= LONGEST:
-        raise UserError(
-            f"--duration is {run.duration:g}; a number from {1 / run.rate:g}, one tick, to {LONGEST:g} in s is needed"
+        raise FieldError(
+            "duration", f"is {run.duration:g}; a number from {1 / run.rate:g}, one tick, to {LONGEST:g} in s is needed"
         )
     final = round(run.duration * run.rate) if run.duration else None
     if run.source:
         activation = load_activation(run.source, limb.muscle_names, run.rate, run.duration or None)
         final = len(activation.values) - 1
     elif run.mode == "lockstep":
-        raise UserError("--activation is missing; in lockstep a bag, CSV, waveform YAML or constants are needed")
+        raise FieldError("source", "is missing; in lockstep a bag, CSV, waveform YAML or constants are needed")
     source = str(Path(run.source).resolve()) if run.source and Path(run.source).exists() else run.source
     return replace(run, limb=str(Path(run.limb).resolve()), out=str(Path(run.out).resolve()), source=source), final

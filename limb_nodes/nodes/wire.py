@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from rclpy.serialization import serialize_message
 
-from limb_nodes.bags.columns import Layout
+from limb_nodes.bags.columns import MessageLayout
 from limb_nodes.bags.types import limb_typestore
 from limb_nodes.nodes.ticks import SECOND
 
@@ -32,10 +32,10 @@ def type_name(kind: type) -> str:
     return f"{package}/{folder}/{kind.__name__}"
 
 
-def example_in_bytes(example: Any) -> tuple[bytes, Layout]:
+def example_in_bytes(example: Any) -> tuple[bytes, MessageLayout]:
     """A message as bytes, and where its fields are in them."""
     data = serialize_message(example)
-    layout = Layout(data, limb_typestore())
+    layout = MessageLayout(data, limb_typestore())
     layout.message(type_name(type(example)), "")
     # What rclpy appends is no part of the message, and readers of bags refuse it.
     return data[: layout.end], layout
@@ -103,14 +103,14 @@ class Incoming:
 
     def _learn(self, data: bytes) -> None:
         """Find where everything is in messages of this size with these names."""
-        layout = Layout(data, limb_typestore())
+        layout = MessageLayout(data, limb_typestore())
         try:
             layout.message(self._kind, "")
         except (IndexError, UnicodeDecodeError) as problem:
             raise ValueError(f"not a {self._kind}: {problem}") from None
         self._use(data, layout)
 
-    def _use(self, data: bytes, layout: Layout) -> None:
+    def _use(self, data: bytes, layout: MessageLayout) -> None:
         """Take messages to be like this one."""
         self._size = len(data)
         self._constant = [(a, b, data[a:b]) for a, b in joined(layout.constant)]

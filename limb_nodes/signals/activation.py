@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from limb_nodes.errors import UserError
+from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.signals.named_values import is_bag, read_named_values
-from limb_nodes.signals.table import TIME_UNITS, read_table
+from limb_nodes.signals.table import check_times, is_value, read_table
 from limb_nodes.signals.waveform import Waveform, parse_constants, read_waveforms, sample_waveforms
 
 # A recorded run holds what drove its muscles on the first topic, a recording of EMG on the second.
 ACTIVATION_TOPICS = ("activation", "emg_envelope")
 MOST_TICKS = 10**8
+RATE = Parameter("rate", "Hz", "ticks per second", above=0.0)
+DURATION = Parameter("duration", "s", "simulated time", above=0.0)
 
 
 @dataclass(frozen=True)
@@ -41,13 +44,16 @@ class Activation:
 
 @dataclass(frozen=True)
 class _Samples:
-    """What a file holds: times [samples] in s, values [samples, names], and how errors name a place."""
+    """What a file or a bag holds.
+
+    times: [samples], s, rising. values: [samples, names]. place: how an error names a sample.
+    """
 
     source: str
     times: FloatArray
     names: tuple[str, ...]
     values: FloatArray
-    places: Sequence[str]
+    place: Callable[[int], str]
     notes: tuple[str, ...] = ()
 
 
@@ -62,23 +68,22 @@ def load_activation(source: str, muscles: Sequence[str], rate: float, duration: 
     muscles: their names, in the order of the columns. rate: ticks per second (Hz). duration: seconds, a whole
     number of ticks; None takes the whole recording.
 
-    Raises UserError where the source cannot be read, lacks a muscle, leaves [0, 1], misses a value or is too
-    short, or where rate or duration are impossible.
+    Raises UserError if the source lacks a muscle, leaves [0, 1], misses a value or is too short; FieldError if the
+    source cannot be read, or if rate or duration are impossible.
     """
-    if not (np.isfinite(rate) and rate > 0):
-        raise UserError(f"rate {rate:g}: must be greater than 0 Hz")
+    RATE.check(rate)
     if duration is not None:
         _ticks(duration, rate)
     if is_bag(source):
         return _from_samples(_bag(source), muscles, rate, duration)
-    there = os.path.exists(source)
-    if not there and "=" in source:
+    if not os.path.exists(source):
+        if "=" not in source:
+            raise FieldError(
+                "source",
+                f"is {source!r}, which is no file; a bag, a CSV file, a waveform YAML, or constants such as "
+                "flexor=0.9,extensor=0 are needed",
+            )
         return _from_waveforms(source, parse_constants(source), muscles, rate, duration)
-    if not there:
-        raise UserError(
-            f"activation '{source}': no such file or folder; must be a bag, a CSV file, a waveform YAML, "
-            "or constants such as flexor=0.9,extensor=0"
-        )
     if Path(source).suffix.lower() in {".yaml", ".yml"}:
         return _from_waveforms(source, read_waveforms(source), muscles, rate, duration)
     return _from_samples(_csv(source), muscles, rate, duration)
@@ -86,25 +91,30 @@ def load_activation(source: str, muscles: Sequence[str], rate: float, duration: 
 
 def _ticks(duration: float, rate: float) -> int:
     """Number of the last tick of a duration that is a whole number of ticks."""
-    if not (np.isfinite(duration) and duration > 0):
-        raise UserError(f"duration {duration:g}: must be greater than 0 s")
-    _check_count(duration * rate, rate)
+    DURATION.check(duration)
+    _check_count(duration, rate)
     last = round(duration * rate)
     if last < 1 or abs(duration * rate - last) > 1e-6 * max(1.0, last * 1e-6):
-        raise UserError(f"duration {duration:g}: must be a whole number of ticks of {1 / rate:g} s (rate {rate:g} Hz)")
+        raise FieldError(
+            "duration", f"is {duration:g}; a whole number of ticks of {1 / rate:g} s is needed (rate {rate:g} Hz)"
+        )
     return last
 
 
-def _check_count(ticks: float, rate: float) -> None:
-    if ticks > MOST_TICKS:
-        raise UserError(f"rate {rate:g}: {ticks:.3g} ticks; at most {MOST_TICKS:g} fit in memory")
+def _check_count(duration: float, rate: float) -> None:
+    if duration * rate > MOST_TICKS:
+        raise FieldError(
+            "rate",
+            f"is {rate:g}, {duration * rate:.3g} ticks in {duration:g} s; at most {MOST_TICKS:g} ticks, which fit in "
+            "memory, are needed",
+        )
 
 
 def _from_waveforms(
     source: str, waveforms: dict[str, Waveform], muscles: Sequence[str], rate: float, duration: float | None
 ) -> Activation:
     if duration is None:
-        raise UserError(f"activation '{source}': a waveform has no end; give a duration in s")
+        raise FieldError("duration", f"is missing; {DURATION.allowed()} is needed, for a waveform has no end", source)
     _check_muscles(source, "muscle", tuple(waveforms), muscles)
     times = np.arange(_ticks(duration, rate) + 1) / rate
     values = sample_waveforms(source, waveforms, muscles, times)
@@ -113,32 +123,31 @@ def _from_waveforms(
 
 def _from_samples(samples: _Samples, muscles: Sequence[str], rate: float, duration: float | None) -> Activation:
     source, times = samples.source, samples.times - samples.times[0]
-    later = np.concatenate([np.isfinite(times[:1]), np.diff(times) > 0])
-    if not later.all():
-        row = int(later.argmin())
-        shown = "no value" if np.isnan(samples.times[row]) else f"{samples.times[row]:g} s"
-        raise UserError(f"{source}, {samples.places[row]}, time: {shown}; must be later than the one before")
     _check_muscles(source, "column", samples.names, muscles)
     values = samples.values[:, [samples.names.index(muscle) for muscle in muscles]]
-    wrong = np.argwhere(~((values >= 0.0) & (values <= 1.0)))
-    if wrong.size:
-        row, column = wrong[0]
-        value = values[row, column]
-        shown = "no value" if np.isnan(value) else f"{value:g}"
-        raise UserError(f"{source}, {samples.places[row]}, {muscles[column]}: {shown}; must be a number in [0, 1]")
+    outside = np.argwhere(~((values >= 0.0) & (values <= 1.0)))
+    if outside.size:
+        row, column = outside[0]
+        raise UserError(
+            f"{source}, {samples.place(row)}: {muscles[column]} {is_value(values[row, column])}; "
+            "a number in [0, 1] is needed"
+        )
     end = float(times[-1])
-    _check_count(end * rate if duration is None else 0.0, rate)
-    last = int(np.floor(end * rate + 1e-6)) if duration is None else _ticks(duration, rate)
-    if last < 1:
-        raise UserError(f"{source}: lasts {end:g} s, less than one tick of {1 / rate:g} s (rate {rate:g} Hz)")
-    if last > end * rate + 1e-6:
-        raise UserError(f"{source}: lasts {end:g} s, shorter than the duration of {duration:g} s")
-    wanted = np.arange(last + 1) / rate
-    if len(times) > last and np.abs(times[: last + 1] - wanted).max() < 1e-9:
-        taken = values[: last + 1].copy()
+    if duration is None:
+        _check_count(end, rate)
+        last = int(np.floor(end * rate + 1e-6))
     else:
-        taken = np.stack([np.interp(wanted, times, values[:, i]) for i in range(len(muscles))], axis=1)
-    return Activation(taken, rate, tuple(muscles), samples.notes + _unused(samples.names, muscles))
+        last = _ticks(duration, rate)
+    if last < 1:
+        raise UserError(f"{source}: lasts {end:g} s; one tick of {1 / rate:g} s (rate {rate:g} Hz) or more is needed")
+    if last > end * rate + 1e-6:
+        raise FieldError("duration", f"is {duration:g}; a number <= {end:g} in s is needed, for it ends there", source)
+    ticks = np.arange(last + 1) / rate
+    if len(times) > last and np.abs(times[: last + 1] - ticks).max() < 1e-9:
+        sampled = values[: last + 1].copy()
+    else:
+        sampled = np.stack([np.interp(ticks, times, values[:, i]) for i in range(len(muscles))], axis=1)
+    return Activation(sampled, rate, tuple(muscles), samples.notes + _unused(samples.names, muscles))
 
 
 def _check_muscles(source: str, what: str, names: Sequence[str], muscles: Sequence[str]) -> None:
@@ -154,20 +163,14 @@ def _unused(names: Sequence[str], muscles: Sequence[str]) -> tuple[str, ...]:
 
 def _csv(source: str) -> _Samples:
     table = read_table(source)
-    column = table.time_column()
-    if column is None:
-        raise UserError(f"{source}: no column 'time' (s); there are {', '.join(table.names)}")
-    times = table.values[:, column] * TIME_UNITS[table.units[column]]
-    places = [f"line {line}" for line in table.lines]
-    keep = [i for i in range(len(table.names)) if i != column]
+    times = table.needed_times()
     notes = () if times[0] == 0 else (f"its times start at {times[0]:g} s; counted from there",)
-    names = tuple(table.names[i] for i in keep)
-    return _Samples(source, times, names, table.values[:, keep], places, notes)
+    return _Samples(source, times, table.names, table.values, table.place, notes)
 
 
 def _bag(source: str) -> _Samples:
     series = read_named_values(source, ACTIVATION_TOPICS)
-    places = [f"topic {series.topic}, tick {tick}" for tick in series.ticks]
+    check_times(source, series.times, series.place)
     missing = int(series.ticks[-1] - series.ticks[0]) + 1 - len(series.ticks)
     notes = (f"ticks missing on {series.topic}, bridged by straight lines: {missing}",) if missing > 0 else ()
-    return _Samples(source, series.times, series.names, series.values, places, notes)
+    return _Samples(source, series.times, series.names, series.values, series.place, notes)

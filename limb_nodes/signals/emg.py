@@ -8,21 +8,22 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
-import scipy
 
-from limb_nodes import __version__
 from limb_nodes.bags.bulk import write_table
+from limb_nodes.bags.versions import versions
 from limb_nodes.bags.write import BagWriter
-from limb_nodes.errors import UserError
+from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.signals import envelope as steps
+from limb_nodes.signals import units
 from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
 from limb_nodes.signals.recording import Recording
-from limb_nodes.signals.table import ANGLE_UNITS, VOLTAGE_UNITS
 
 ENVELOPE_TOPIC = "emg_envelope"
 ANGLE_TOPIC = "reference_angle"
+REST = Parameter("rest", "s", "length of the quietest stretch", minimum=0.0)
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class EnvelopeOptions:
 
 
 @dataclass(frozen=True)
-class Channel:
+class EmgChannel:
     """What became of one channel.
 
     column, name: its name in the recording and its new one. maximum, rest: the levels that became 1
@@ -96,7 +97,7 @@ class Envelopes:
 
     source: str
     rate: float
-    channels: tuple[Channel, ...]
+    channels: tuple[EmgChannel, ...]
     values: FloatArray
     angle_channels: tuple[AngleChannel, ...]
     angles: FloatArray
@@ -111,8 +112,8 @@ class Envelopes:
 def envelopes(recording: Recording, options: EnvelopeOptions | None = None) -> Envelopes:
     """Turn a recording's EMG channels into normalised envelopes, and keep its angle columns.
 
-    Raises UserError where a named channel is not there or is no EMG, a channel has no value or no
-    signal, an option is out of range, or the rate is too low for the filters.
+    Raises FieldError if an option is out of range, names a column that is not there or is no EMG, or if a filter
+    cannot work at this rate; UserError if a channel has no value or no signal.
     """
     options = options or EnvelopeOptions()
     _check_names(recording, options)
@@ -120,22 +121,22 @@ def envelopes(recording: Recording, options: EnvelopeOptions | None = None) -> E
     chosen, angle_columns = _chosen(recording, options)
     raw, gaps = _bridged(recording, [column for column, _ in chosen])
     angles, angle_gaps = _bridged(recording, [column for column, _ in angle_columns])
-    angles *= np.array([ANGLE_UNITS[recording.unit(column)] for column, _ in angle_columns])
+    angles *= np.array([units.ANGLE[recording.unit(column)] for column, _ in angle_columns])
     for i, (column, _) in enumerate(chosen):
         if np.ptp(raw[:, i]) == 0.0:
             raise UserError(
-                f"{recording.source}, channel {column}: every sample is {raw[0, i]:g}; "
-                "a channel without a signal cannot be normalised"
+                f"{recording.source}: channel {column} is {raw[0, i]:g} everywhere; a signal, which can be normalised, "
+                "is needed"
             )
     signal = _smoothed(recording, raw, options)
-    with _naming(recording, "--rest"):
+    with _naming(recording, "rest"):
         rest = steps.rest_level(signal, recording.rate, options.rest) if options.rest else np.zeros(len(chosen))
     maximum = np.array([options.maximum.get(column, signal[:, i].max()) for i, (column, _) in enumerate(chosen)])
     for i, (column, _) in enumerate(chosen):
         if not maximum[i] > rest[i]:
             raise UserError(
-                f"{recording.source}, channel {column}: maximum {maximum[i]:g}; "
-                f"must be above the rest level {rest[i]:g}"
+                f"{recording.source}: the maximum of channel {column} is {maximum[i]:g}; a number > {rest[i]:g}, its "
+                "rest level, is needed"
             )
     values, above = steps.normalise(signal, maximum, rest)
     rate = recording.rate
@@ -144,7 +145,7 @@ def envelopes(recording: Recording, options: EnvelopeOptions | None = None) -> E
         values, angles = both[:, : len(chosen)], both[:, len(chosen) :]
         rate = options.resample
     channels = tuple(
-        Channel(column, name, recording.unit(column), gaps[i], float(maximum[i]), float(rest[i]), above[i])
+        EmgChannel(column, name, recording.unit(column), gaps[i], float(maximum[i]), float(rest[i]), above[i])
         for i, (column, name) in enumerate(chosen)
     )
     angle_channels = tuple(AngleChannel(column, name, angle_gaps[i]) for i, (column, name) in enumerate(angle_columns))
@@ -156,69 +157,69 @@ def _smoothed(recording: Recording, raw: FloatArray, options: EnvelopeOptions) -
     """Filter, rectify and smooth: [samples, channels], in the recording's units."""
     signal = raw
     if options.band is not None:
-        with _naming(recording, "--band-pass"):
+        with _naming(recording, "band"):
             signal = steps.band_pass(signal, recording.rate, options.band, options.band_order)
     if options.rectify:
         signal = steps.rectify(signal)
     if options.low_pass is not None:
-        with _naming(recording, "--low-pass"):
+        with _naming(recording, "low_pass"):
             signal = steps.low_pass(signal, recording.rate, options.low_pass, options.low_pass_order)
     return signal
 
 
 @contextmanager
-def _naming(recording: Recording, option: str) -> Iterator[None]:
-    """Turn the ValueError of a step into a line that names the recording and the option."""
+def _naming(recording: Recording, field: str) -> Iterator[None]:
+    """Turn the ValueError of a step into a line that names the recording and the field of the options."""
     try:
         yield
     except ValueError as error:
-        raise UserError(f"{recording.source} ({recording.rate:g} Hz), {option}: {error}") from error
+        raise FieldError(field, str(error), f"{recording.source} ({recording.rate:g} Hz)") from error
 
 
 def _check_names(recording: Recording, options: EnvelopeOptions) -> None:
-    there = ", ".join(recording.names)
-    named = {
-        "channel": options.channels,
-        "angle": options.angles,
+    fields = {
+        "channels": options.channels,
+        "angles": options.angles,
         "skip": options.skip,
         "maximum": options.maximum,
     }
-    for option, names in named.items():
+    for option, names in fields.items():
         for name in names:
             if name not in recording.names:
-                raise UserError(f"{recording.source}: no column '{name}' (--{option}); there are {there}")
+                raise FieldError(
+                    option, f"names {name!r}; one of {', '.join(recording.names)} is needed", recording.source
+                )
     for name in options.channels:
-        if recording.unit(name) in ANGLE_UNITS:
-            raise UserError(
-                f"{recording.source}: column '{name}' (--channel) is in {recording.unit(name)}; "
-                "EMG is in V, mV, uV or without a unit, angles belong to --angle"
+        unit = recording.unit(name)
+        if unit in units.ANGLE:
+            raise FieldError(
+                "channels",
+                f"names {name!r}, which is in {unit}; a column in V, mV, uV or without a unit is needed",
+                recording.source,
             )
     for name in options.angles:
-        if recording.unit(name) not in ANGLE_UNITS:
-            unit = recording.unit(name) or "has no unit"
-            raise UserError(f"{recording.source}: column '{name}' (--angle): {unit}; must be deg or rad")
+        unit = recording.unit(name)
+        if unit not in units.ANGLE:
+            stated = f"is in {unit}" if unit else "has no unit"
+            raise FieldError(
+                "angles", f"names {name!r}, which {stated}; a column in deg or rad is needed", recording.source
+            )
 
 
 def _check_numbers(options: EnvelopeOptions, rate: float) -> None:
     for name, value in options.maximum.items():
         if not (np.isfinite(value) and value > 0):
-            raise UserError(f"--maximum {name}={value:g}: must be greater than 0")
-    if not (np.isfinite(options.rest) and options.rest >= 0):
-        raise UserError(f"--rest {options.rest:g}: must be 0 s or more")
-    if options.resample is None:
-        return
-    if not 0 < options.resample <= 10 * rate:
-        raise UserError(
-            f"--resample {options.resample:g}: must be greater than 0 and at most ten times the rate, {10 * rate:g} Hz"
-        )
-    if options.low_pass is not None and options.resample < 2 * options.low_pass:
-        raise UserError(
-            f"--resample {options.resample:g}: must be twice the low-pass of {options.low_pass:g} Hz or more"
-        )
+            raise FieldError("maximum", f"of {name} is {value:g}; a number > 0 is needed")
+    REST.check(options.rest)
+    if options.resample is not None:
+        # Less than twice the low-pass loses some of the envelope; more than ten times the rate adds nothing.
+        above, least = (None, 2 * options.low_pass) if options.low_pass else (0.0, None)
+        allowed = Parameter("resample", "Hz", "rate of the envelopes", above=above, minimum=least, maximum=10 * rate)
+        allowed.check(options.resample)
 
 
 def _is_emg(recording: Recording, column: str) -> bool:
-    return recording.unit(column) == "" or recording.unit(column) in VOLTAGE_UNITS
+    return recording.unit(column) == "" or recording.unit(column) in units.VOLTAGE
 
 
 def _chosen(recording: Recording, options: EnvelopeOptions) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
@@ -226,7 +227,7 @@ def _chosen(recording: Recording, options: EnvelopeOptions) -> tuple[list[tuple[
     left = [name for name in recording.names if name not in options.skip]
     emg = [name for name in left if name in options.channels or (not options.channels and _is_emg(recording, name))]
     angle = [
-        name for name in left if recording.unit(name) in ANGLE_UNITS and (name in options.angles or not options.angles)
+        name for name in left if recording.unit(name) in units.ANGLE and (name in options.angles or not options.angles)
     ]
     if not emg:
         raise UserError(
@@ -234,14 +235,14 @@ def _chosen(recording: Recording, options: EnvelopeOptions) -> tuple[list[tuple[
         )
     for name in options.maximum:
         if name not in emg:
-            raise UserError(f"{recording.source}: --maximum {name}: not among the channels taken, {', '.join(emg)}")
+            raise FieldError("maximum", f"names {name!r}; one of {', '.join(emg)} is needed", recording.source)
     chosen = [(name, options.channels.get(name, name)) for name in emg]
     angles = [(name, options.angles.get(name, name)) for name in angle]
-    for kind in (chosen, angles):
-        new = [name for _, name in kind]
+    for option, columns in (("channels", chosen), ("angles", angles)):
+        new = [name for _, name in columns]
         for name in new:
             if new.count(name) > 1:
-                raise UserError(f"{recording.source}: two columns would be named '{name}'; names must differ")
+                raise FieldError(option, f"names two columns {name!r}; different names are needed", recording.source)
     return chosen, angles
 
 
@@ -250,7 +251,7 @@ def _left_out(recording: Recording, options: EnvelopeOptions) -> tuple[str, ...]
     return tuple(
         f"column '{name}' is in {recording.unit(name)}, neither EMG nor angle: left out"
         for name in recording.names
-        if recording.unit(name) not in ANGLE_UNITS
+        if recording.unit(name) not in units.ANGLE
         and not _is_emg(recording, name)
         and name not in options.channels
         and name not in options.skip
@@ -262,44 +263,46 @@ def _bridged(recording: Recording, columns: Sequence[str]) -> tuple[FloatArray, 
     gaps = []
     for i, column in enumerate(columns):
         try:
-            bridged[:, i], found = steps.bridge_gaps(recording.values[:, recording.names.index(column)])
+            bridged[:, i], in_channel = steps.bridge_gaps(recording.values[:, recording.names.index(column)])
         except ValueError:
-            raise UserError(f"{recording.source}, channel {column}: nothing but missing values") from None
-        gaps.append(found)
+            raise UserError(f"{recording.source}: channel {column} holds no value; at least one is needed") from None
+        gaps.append(in_channel)
     return bridged, gaps
 
 
-def write_envelopes(found: Envelopes, out: str | Path, options: EnvelopeOptions | None = None) -> None:
-    """Write envelopes to a new bag: `emg_envelope` and, where there are angles, `reference_angle` at every tick.
+def write_envelopes(result: Envelopes, out: str | Path, options: EnvelopeOptions | None = None) -> None:
+    """Write envelopes to a new bag: `emg_envelope` and, if there are angles, `reference_angle` at every tick.
 
     Tick k is stamped k times the period, rounded to whole nanoseconds. run_info holds the recording's name, the
     options, what became of each channel, and versions.
 
-    Raises UserError where the bag cannot be made; nothing is written then.
+    Raises UserError if the bag cannot be made; nothing is written then.
     """
-    period = round(1e9 / found.rate)
+    period = round(1e9 / result.rate)
     run_info = {
         "command": "limb emg",
-        "source": found.source,
-        "rate": found.rate,
+        "source": result.source,
+        "rate": result.rate,
         "period_ns": period,
         "parameters": (options or EnvelopeOptions()).as_mapping(),
-        "channels": [asdict(channel) for channel in found.channels],
-        "angles": [asdict(channel) for channel in found.angle_channels],
-        "notes": list(found.notes),
-        "versions": {"limb_nodes": __version__, "numpy": np.__version__, "scipy": scipy.__version__},
+        "channels": [asdict(channel) for channel in result.channels],
+        "angles": [asdict(channel) for channel in result.angle_channels],
+        "notes": list(result.notes),
+        "versions": versions(),
     }
-    stamps = np.arange(len(found.values), dtype=np.int64) * period
-    ticks = np.arange(len(found.values), dtype=np.uint64)
+    stamps = np.arange(len(result.values), dtype=np.int64) * period
+    ticks = np.arange(len(result.values), dtype=np.uint64)
     with BagWriter(out, run_info) as bag:
         write_table(
             bag,
             ENVELOPE_TOPIC,
             TOPIC_TYPES[ENVELOPE_TOPIC],
             stamps,
-            {"name": found.names, "last_tick": len(found.values) - 1},
-            {"tick": ticks, "activation": found.values},
+            {"name": result.names, "last_tick": len(result.values) - 1},
+            {"tick": ticks, "activation": result.values},
         )
-        if found.angle_channels:
-            names = [channel.name for channel in found.angle_channels]
-            write_table(bag, ANGLE_TOPIC, TOPIC_TYPES[ANGLE_TOPIC], stamps, {"name": names}, {"position": found.angles})
+        if result.angle_channels:
+            names = [channel.name for channel in result.angle_channels]
+            write_table(
+                bag, ANGLE_TOPIC, TOPIC_TYPES[ANGLE_TOPIC], stamps, {"name": names}, {"position": result.angles}
+            )

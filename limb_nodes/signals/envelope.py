@@ -8,7 +8,7 @@ The usual chain is band_pass, rectify, low_pass, normalise; the defaults stand w
 - low-pass 6 Hz, fourth order, no phase shift: the linear envelope (Winter, Biomechanics and Motor
   Control of Human Movement, 4th ed. 2009, ch. 10: 3 to 6 Hz for movement).
 - order and zero phase: a Butterworth filter of half the order runs forward and backward, its corner
-  corrected so that the two passes together lose 3 dB where asked (Winter, ch. 3).
+  corrected so that the two passes together lose 3 dB there (Winter, ch. 3).
 """
 
 from __future__ import annotations
@@ -43,17 +43,17 @@ def bridge_gaps(values: FloatArray) -> tuple[FloatArray, Gaps]:
     """Replace missing samples (NaN) along straight lines; ends hold the nearest value.
 
     values: [samples]. Returns the same without NaN, and what was bridged.
-    Raises ValueError where no sample is finite.
+    Raises ValueError if no sample is finite.
     """
     missing = ~np.isfinite(values)
     if missing.all():
-        raise ValueError("no finite sample")
+        raise ValueError("no sample is finite; at least one is needed")
     if not missing.any():
         return values.copy(), Gaps(0, 0, 0)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
     lengths = edges[1::2] - edges[::2]
-    where = np.arange(len(values))
-    bridged = np.interp(where, where[~missing], values[~missing])
+    samples = np.arange(len(values))
+    bridged = np.interp(samples, samples[~missing], values[~missing])
     return bridged, Gaps(len(lengths), int(lengths.sum()), int(lengths.max()))
 
 
@@ -65,7 +65,7 @@ def band_pass(values: FloatArray, rate: float, band: tuple[float, float], order:
     """
     low, high = band
     if not low < high:
-        raise ValueError(f"band-pass {low:g} {high:g} Hz: the lower edge must be below the upper")
+        raise ValueError(f"edges are {low:g} and {high:g}; a lower and then a higher number in Hz are needed")
     return _zero_phase(_zero_phase(values, rate, low, order, "highpass"), rate, high, order, "lowpass")
 
 
@@ -86,30 +86,29 @@ def low_pass(
 
 
 def check_filter(samples: int, rate: float, corner: float, order: int) -> None:
-    """Raise ValueError with a sentence where a filter cannot work on such a signal.
+    """Raise ValueError, of the form `NAME is VALUE; WHAT is needed`, if a filter cannot work on such a signal.
 
     The corner lies between 0 and half the rate, the order is even and 2 to 12, and the signal lasts one
     period of the corner frequency at least.
     """
     if order < 2 or order > 12 or order % 2:
-        raise ValueError(f"filter order {order}: must be even, 2 to 12")
+        raise ValueError(f"order is {order}; an even number from 2 to 12 is needed")
     if not 0 < corner < rate / 2:
-        raise ValueError(f"filter corner {corner:g} Hz: must lie between 0 and half the rate, {rate / 2:g} Hz")
+        raise ValueError(f"corner is {corner:g}; a number > 0 and < {rate / 2:g} in Hz, half the rate, is needed")
     if samples < max(2, rate / corner):
         raise ValueError(
-            f"{samples} samples: a filter corner of {corner:g} Hz needs one period at least, "
-            f"{int(np.ceil(rate / corner))} samples"
+            f"corner is {corner:g}; {int(np.ceil(rate / corner))} samples, one period of it, are needed, not {samples}"
         )
 
 
 def rest_level(envelope: FloatArray, rate: float, seconds: float) -> FloatArray:
     """The lowest mean over any stretch of the given length: [channels], in the envelope's unit.
 
-    envelope: [samples, channels]. Raises ValueError where the stretch is longer than the envelope.
+    envelope: [samples, channels]. Raises ValueError if the stretch is longer than the envelope.
     """
     window = max(1, round(seconds * rate))
     if window > len(envelope):
-        raise ValueError(f"rest of {seconds:g} s: longer than the recording of {len(envelope) / rate:g} s")
+        raise ValueError(f"is {seconds:g}; a number <= {len(envelope) / rate:g} in s, the whole recording, is needed")
     means = uniform_filter1d(envelope, window, axis=0)
     whole = slice(window // 2, len(envelope) - (window - 1) // 2)
     lowest: FloatArray = means[whole].min(axis=0)
@@ -123,11 +122,11 @@ def normalise(
 
     envelope: [samples, channels]; maximum, rest: [channels], in the envelope's unit.
     Returns the activations [samples, channels], dimensionless, and per channel how many samples
-    exceeded the maximum. Raises ValueError where a maximum is not above its rest level.
+    exceeded the maximum. Raises ValueError if a maximum is not above its rest level.
     """
     span = maximum - rest
     if not np.all(span > 0):
-        raise ValueError("a maximum is not above its rest level")
+        raise ValueError("a maximum is not above its rest level; a greater one is needed")
     scaled = (envelope - rest) / span
     above = (scaled > 1.0).sum(axis=0)
     return np.clip(scaled, 0.0, 1.0), [int(n) for n in above]
@@ -137,10 +136,10 @@ def resample(values: FloatArray, rate: float, new_rate: float) -> FloatArray:
     """Take a signal at another rate, by straight lines between its samples.
 
     values: [samples, channels] at `rate` (Hz). Returns [new samples, channels] at `new_rate`, from the same first
-    instant to the last that the signal covers. Raises ValueError where the new rate is not above 0.
+    instant to the last that the signal covers. Raises ValueError if the new rate is not above 0.
     """
     if not new_rate > 0:
-        raise ValueError(f"rate {new_rate:g} Hz: must be greater than 0")
+        raise ValueError(f"is {new_rate:g}; a number > 0 in Hz is needed")
     times = np.arange(len(values)) / rate
     count = int(np.floor(times[-1] * new_rate + 1e-9)) + 1
     new_times = np.arange(count) / new_rate

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
-from limb_nodes.signals.table import TIME_UNITS, read_table
-
-LENGTH_UNITS = {"": 1.0, "m": 1.0, "mm": 1e-3}
+from limb_nodes.signals import units
+from limb_nodes.signals.table import is_value, read_table
 
 
 def read_length_course(path: str | Path) -> tuple[FloatArray, FloatArray]:
@@ -20,27 +17,19 @@ def read_length_course(path: str | Path) -> tuple[FloatArray, FloatArray]:
     Raises UserError that names file, line, column and value.
     """
     table = read_table(path)
-    column = table.time_column()
+    time = table.needed_times()
+    column = next((index for index, name in enumerate(table.names) if name.lower() == "length"), None)
     if column is None:
-        raise UserError(f"{path}: no column 'time' (s); there are {', '.join(table.names)}")
-    named = [i for i, name in enumerate(table.names) if name.lower() == "length"]
-    if not named:
-        raise UserError(f"{path}: no column 'length' (m or mm); there are {', '.join(table.names)}")
-    unit = table.units[named[0]]
-    if unit not in LENGTH_UNITS:
-        raise UserError(f"{path}, column length: its unit is {unit}; m or mm is needed")
-    time = table.values[:, column] * TIME_UNITS[table.units[column]]
-    length = table.values[:, named[0]] * LENGTH_UNITS[unit]
+        raise UserError(f"{path}: no column 'length' in m or mm; there are {', '.join(table.header.names)}")
+    unit = table.units[column]
+    if unit not in units.LENGTH:
+        raise UserError(f"{path}: the unit of length is {unit}; m or mm is needed")
+    length = table.values[:, column] * units.LENGTH[unit]
     if len(time) < 2:
-        raise UserError(f"{path}: holds {len(time)} rows; at least 2 are needed")
-    later = np.concatenate([np.isfinite(time[:1]), np.diff(time) > 0.0])
-    for good, what, allowed in (
-        (later, "time", "a time later than the one before"),
-        (length > 0.0, "length", "a number > 0"),
-    ):
-        if not good.all():
-            row = int(good.argmin())
-            value = table.values[row, column if what == "time" else named[0]]
-            shown = "no value" if np.isnan(value) else f"{value:g}"
-            raise UserError(f"{path}, line {table.lines[row]}, {what}: {shown}; {allowed} is needed")
+        raise UserError(f"{path}: holds one row; at least 2 are needed")
+    if not (length > 0.0).all():
+        row = int((length > 0.0).argmin())
+        raise UserError(
+            f"{path}, {table.place(row)}: length {is_value(table.values[row, column])}; a number > 0 is needed"
+        )
     return time - time[0], length

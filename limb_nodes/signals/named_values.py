@@ -28,6 +28,10 @@ class NamedValues:
     times: FloatArray
     ticks: npt.NDArray[np.uint64]
 
+    def place(self, row: int) -> str:
+        """How an error names a message."""
+        return f"topic {self.topic}, tick {self.ticks[row]}"
+
 
 def is_bag(path: str | Path) -> bool:
     """Whether a path is to be read as a bag: a folder, or the file of messages in one."""
@@ -38,7 +42,7 @@ def is_bag(path: str | Path) -> bool:
 def read_named_values(path: str | Path, topics: Sequence[str]) -> NamedValues:
     """Read the first of several topics that a bag has, of a type with `name`, `activation` and `tick`.
 
-    Raises UserError where the bag cannot be read, has none of the topics, or the topic is of another kind.
+    Raises UserError if the bag cannot be read, has none of the topics, or the topic is of another kind.
     """
     # Only here: rosbags takes a fifth of a second to import, and most sources are no bags.
     from limb_nodes.bags.read import BagReader
@@ -46,8 +50,8 @@ def read_named_values(path: str | Path, topics: Sequence[str]) -> NamedValues:
     with BagReader(path) as reader:
         topic = next((topic for topic in topics if reader.has(topic)), None)
         if topic is None:
-            wanted = " or ".join(topics)
-            raise UserError(f"{path}: no message on {wanted}; the bag has {', '.join(reader.topics) or 'no topic'}")
+            either = " or ".join(topics)
+            raise UserError(f"{path}: no message on {either}; the bag has {', '.join(reader.topics) or 'no topic'}")
         table = reader.table(topic)
     missing = [field for field in ("name", "activation", "tick") if field not in table]
     if missing:

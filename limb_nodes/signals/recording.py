@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from limb_nodes.errors import UserError
+from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.signals.named_values import is_bag, read_named_values
-from limb_nodes.signals.table import TIME_UNITS, Table, check_names, delimiter_of, parse_rows, read_lines, read_table
+from limb_nodes.signals.table import TextTable, check_times, read_table
 
 RAW_TOPIC = "emg_raw"
-MOST_RATE = 1e6
-
-_CHANNEL = re.compile(
-    r"Channel\s+\d+:\s*'(?P<name>[^']*)'\s*,\s*(?P<count>\d+)\s+values\s*,"
-    r"\s*engineering units:\s*(?P<unit>[^,\s]+?)\s*[,.]?(?:\s.*)?"
-)
-_CHANNEL_RATE = re.compile(r"(?P<rate>\d+(?:\.\d+)?)\s+samples per second")
+RATE = Parameter("rate", "Hz", "samples per second", above=0.0, maximum=1e6)
 
 
 @dataclass(frozen=True)
@@ -29,7 +23,7 @@ class Recording:
     """Channels sampled together at one rate.
 
     source: the file or bag, as the user named it.
-    names, units: one per channel; the unit is "" where the recording does not state one.
+    names, units: one per channel; the unit is "" if the recording does not state one.
     values: [samples, channels], in the channels' units; NaN where a value is missing. Samples at
         the end that miss every channel are left out.
     rate: samples per second (Hz).
@@ -51,125 +45,91 @@ class Recording:
 def read_recording(path: str | Path, *, rate: float | None = None, topic: str = RAW_TOPIC) -> Recording:
     """Read a recording from a text file or from a bag.
 
-    A file is tab- or comma-separated text under either a line of column names, with an optional column
-    of times, or a header of lines such as `Channel 1: 'RF', 13480 values, engineering units: mV, ...`.
-    A bag (a folder) holds its channels as messages with `name` and `activation` on `topic`.
+    A file is a text table (`limb_nodes.signals.table`), with or without a column of times. A bag holds its channels
+    as messages with `name` and `activation` on `topic`.
 
-    rate: samples per second; where None it follows from the times, or from the header.
+    rate: samples per second; if None, it follows from the times, or from the header.
 
-    Raises UserError where the input cannot be read, its rate is unknown or contradicts its times, or
-    its times do not rise evenly.
+    Raises UserError if the input cannot be read, its rate is unknown or contradicts its times, or its times do not
+    rise evenly; FieldError if the rate that was given is at fault.
     """
-    if rate is not None and not 0 < rate <= MOST_RATE:
-        raise UserError(f"rate {rate:g}: must be greater than 0 Hz and at most {MOST_RATE:g}")
+    if rate is not None:
+        RATE.check(rate)
     if is_bag(path):
-        return _read_bag(path, rate, topic)
-    lines = read_lines(path)
-    heads = {i: match for i, line in enumerate(lines[:200]) if (match := _CHANNEL.fullmatch(line.strip()))}
-    if heads:
-        return _read_channel_header(path, lines, heads, rate)
+        return _from_bag(path, rate, topic)
     return _from_table(read_table(path), rate)
 
 
-def _read_channel_header(
-    path: str | Path, lines: Sequence[str], heads: Mapping[int, re.Match[str]], rate: float | None
-) -> Recording:
-    """Read rows below lines that describe the channels. heads: the match of each such line, by index."""
-    start = max(heads) + 1
-    while start < len(lines) and not lines[start].strip(" \r\n"):
-        start += 1
-    names = tuple(match["name"] for match in heads.values())
-    units = tuple(match["unit"] for match in heads.values())
-    check_names(path, max(heads) + 1, names)
-    if rate is None:
-        rate = _header_rate(path, heads)
-    separator = delimiter_of(lines[start]) if start < len(lines) else ","
-    values, _ = parse_rows(path, lines, start, separator, names)
-    values, notes = _without_empty_end(path, values)
-    expected = max(int(match["count"]) for match in heads.values())
-    if expected != len(values):
-        notes += (f"the header promises {expected} values, {len(values)} are there",)
-    return Recording(str(path), names, units, values, rate, notes)
-
-
-def _header_rate(path: str | Path, heads: Mapping[int, re.Match[str]]) -> float:
-    found = {_CHANNEL_RATE.search(match[0]) for match in heads.values()}
-    rates = {float(match["rate"]) for match in found if match}
-    if not rates:
-        raise UserError(f"{path}: the header does not state samples per second; give --rate HZ")
-    if len(rates) > 1 or min(rates) <= 0:
-        shown = " and ".join(f"{rate:g}" for rate in sorted(rates))
-        raise UserError(f"{path}: the header states {shown} samples per second; give --rate HZ")
-    return rates.pop()
-
-
-def _from_table(table: Table, rate: float | None) -> Recording:
-    column = table.time_column()
-    if column is None:
-        if rate is None:
-            raise UserError(f"{table.source}: no column of times and no rate; give --rate HZ")
-        values, notes = _without_empty_end(table.source, table.values)
-        return Recording(table.source, table.names, table.units, values, rate, notes)
-    keep = [i for i in range(len(table.names)) if i != column]
-    if not keep:
+def _from_table(table: TextTable, rate: float | None) -> Recording:
+    if not table.names:
         raise UserError(f"{table.source}: no column beside the times; at least one channel is needed")
-    values, empty = _without_empty_end(table.source, table.values[:, keep])
-    times = table.values[: len(values), column] * TIME_UNITS[table.units[column]]
-    places = [f"line {line}" for line in table.lines[: len(values)]]
-    values, rate, notes = _on_even_times(table.source, times, values, places, rate)
-    names = tuple(table.names[i] for i in keep)
-    units = tuple(table.units[i] for i in keep)
-    return Recording(table.source, names, units, values, rate, empty + notes)
+    values, notes = _without_empty_end(table.source, table.values)
+    if table.times is not None:
+        times = table.times[: len(values)]
+        values, rate, missing = _on_even_times(table.source, times, values, table.place, rate)
+        notes += missing
+    elif rate is None:
+        rate = _stated_rate(table)
+    promised = table.header.rows
+    if promised not in (None, len(values)):
+        notes += (f"the header promises {promised} values, {len(values)} are there",)
+    return Recording(table.source, table.names, table.units, values, rate, notes)
 
 
-def _read_bag(path: str | Path, rate: float | None, topic: str) -> Recording:
+def _stated_rate(table: TextTable) -> float:
+    """The one rate (Hz) that the header states."""
+    rates = table.header.rates
+    if len(rates) == 1 and rates[0] > 0.0:
+        return rates[0]
+    stated = f"states {' and '.join(f'{rate:g}' for rate in rates)}" if rates else "states no"
+    raise FieldError(
+        "rate",
+        f"is missing: there are no times, and the header {stated} samples per second; {RATE.allowed()} is needed",
+        table.source,
+    )
+
+
+def _from_bag(path: str | Path, rate: float | None, topic: str) -> Recording:
     series = read_named_values(path, (topic,))
     values, empty = _without_empty_end(f"{path}: topic {series.topic}", series.values)
-    places = [f"tick {tick}" for tick in series.ticks[: len(values)]]
-    values, rate, notes = _on_even_times(str(path), series.times[: len(values)], values, places, rate)
-    return Recording(str(path), series.names, ("",) * len(series.names), values, rate, empty + notes)
+    values, rate, missing = _on_even_times(str(path), series.times[: len(values)], values, series.place, rate)
+    return Recording(str(path), series.names, ("",) * len(series.names), values, rate, empty + missing)
 
 
 def _without_empty_end(source: str | Path, values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Leave out the rows at the end that hold no value at all, and note how many."""
     filled = np.flatnonzero(np.isfinite(values).any(axis=1))
     if not filled.size:
-        raise UserError(f"{source}: nothing but missing values; at least one sample is needed")
+        raise UserError(f"{source}: holds no value; at least one sample is needed")
     kept = int(filled[-1]) + 1
     empty = len(values) - kept
     return values[:kept], (f"rows without any value at the end, left out: {empty}",) if empty else ()
 
 
 def _on_even_times(
-    source: str, times: FloatArray, values: FloatArray, places: Sequence[str], rate: float | None
+    source: str, times: FloatArray, values: FloatArray, place: Callable[[int], str], rate: float | None
 ) -> tuple[FloatArray, float, tuple[str, ...]]:
     """Find the rate of evenly spaced times, and put NaN where rows between are missing.
 
-    times: [rows] in s; values: [rows, channels]; places: [rows], how an error names a row.
+    times: [rows] in s; values: [rows, channels]; place: how an error names a row.
     Returns values [samples, channels], the rate in Hz, and notes.
     """
     if len(times) < 2:
-        raise UserError(f"{source}: one row; at least two are needed for a rate")
-    bad = np.flatnonzero(~np.isfinite(times))
-    if bad.size:
-        raise UserError(f"{source}, {places[bad[0]]}: the time is missing; every row needs one")
-    steps = np.diff(times)
-    bad = np.flatnonzero(steps <= 0)
-    if bad.size:
-        raise UserError(
-            f"{source}, {places[bad[0] + 1]}: time {times[bad[0] + 1]:g} s; must be later than the row before"
-        )
+        raise UserError(f"{source}: holds one row; at least 2 are needed for a rate")
+    check_times(source, times, place)
+    steps, duration = np.diff(times), times[-1] - times[0]
     step = float(np.median(steps)) if rate is None else 1.0 / rate
     ticks = np.concatenate([[0], np.cumsum(np.maximum(1, np.rint(steps / step)).astype(np.int64))])
-    found = _plain_rate(ticks[-1] / (times[-1] - times[0]), times[-1] - times[0])
-    if rate is not None and abs(found - rate) * (times[-1] - times[0]) > 1.0:
-        raise UserError(f"{source}: the times give {found:g} Hz, not the rate of {rate:g} Hz; leave out --rate")
-    rate = found if rate is None else rate
+    measured = _plain_rate(ticks[-1] / duration, duration)
+    if rate is not None and abs(measured - rate) * duration > 1.0:
+        raise FieldError("rate", f"is {rate:g}; {measured:g} in Hz is needed, as the times say, or no rate", source)
+    rate = measured if rate is None else rate
     late = np.abs(times - times[0] - ticks / rate) * rate
     if late.max() > 0.5:
         worst = int(late.argmax())
         raise UserError(
-            f"{source}, {places[worst]}: time {times[worst]:g} s; times must be evenly spaced, here by {1 / rate:g} s"
+            f"{source}, {place(worst)}: time is {times[worst]:.9g}; times at an even distance, here {1 / rate:g} s, "
+            "are needed"
         )
     missing = int(ticks[-1]) + 1 - len(ticks)
     if not missing:
@@ -180,6 +140,6 @@ def _on_even_times(
 
 
 def _plain_rate(rate: float, duration: float) -> float:
-    """Round a rate to six digits where that moves the last sample by less than 1 % of a step."""
+    """Round a rate to six digits if that moves the last sample by less than 1 % of a step."""
     plain = float(f"{rate:.6g}")
     return plain if abs(plain - rate) * duration < 0.01 else rate

@@ -112,7 +112,7 @@ class Waveform:
     clip: bool = False
 
     def sample(self, time: FloatArray) -> FloatArray:
-        """Activation at times [samples] in s; outside [0, 1] only where not clipped."""
+        """Activation at times [samples] in s; outside [0, 1] only if not clipped."""
         values = WAVES[self.wave].sample(time, self.numbers)
         return np.clip(values, 0.0, 1.0) if self.clip else values
 
@@ -140,17 +140,15 @@ def parse_constants(text: str) -> dict[str, Waveform]:
     for entry in text.split(","):
         name, equals, number = (part.strip() for part in entry.partition("="))
         if not (name and equals and number):
-            raise UserError(
-                f"activation '{text}': '{entry.strip()}' is not MUSCLE=VALUE, for example flexor=0.9,extensor=0"
-            )
+            raise UserError(f"{text}: {entry.strip()!r} is no constant; MUSCLE=VALUE, such as flexor=0.9, is needed")
         if name in waveforms:
-            raise UserError(f"activation '{text}': muscle '{name}' stands twice; once is allowed")
+            raise UserError(f"{text}: {name} is there twice; one value for each muscle is needed")
         try:
             value = float(number)
         except ValueError:
             value = float("nan")
         if not 0.0 <= value <= 1.0:
-            raise UserError(f"activation '{text}': {name} is {number}; a number in [0, 1] is needed")
+            raise UserError(f"{text}: {name} is {number}; a number in [0, 1] is needed")
         waveforms[name] = Waveform("constant", {"value": value})
     return waveforms
 
@@ -160,7 +158,7 @@ def sample_waveforms(
 ) -> FloatArray:
     """Activations [samples, muscles] at evenly spaced times [samples] in s.
 
-    Raises UserError where a waveform leaves [0, 1] without being clipped, or oscillates faster than
+    Raises UserError if a waveform leaves [0, 1] without being clipped, or oscillates faster than
     the samples can follow.
     """
     rate = (len(times) - 1) / times[-1]

@@ -154,8 +154,8 @@ def test_svg_names_every_unit(tmp_path):
 @pytest.mark.parametrize(
     ("limb", "out", "words"),
     [
-        ("params/arm.yaml", "curves.txt", "the name of a picture ends in .png, .pdf, .svg"),
-        ("params/arm.yaml", "nowhere/curves.png", "cannot be written: No such file or directory"),
+        ("params/arm.yaml", "curves.txt", "a name that ends in .png or .pdf or .svg is needed"),
+        ("params/arm.yaml", "nowhere/curves.png", "a folder that exists is needed"),
         ("params/none.yaml", "curves.png", "no such file"),
     ],
 )

@@ -441,7 +441,7 @@ def test_one_level_only(capsys):
     assert "whole model" in text
     assert "sub-level" not in text
     assert "(2.12)" in text
-    with pytest.raises(UserError, match="aponeurosis: no muscle of this limb has this level"):
+    with pytest.raises(UserError, match="level is aponeurosis; a level that a muscle of this limb has is needed"):
         limb_structure(PARAMS / "reference_joint.yaml", "--level", "aponeurosis")
 
 
@@ -486,9 +486,9 @@ def test_a_picture_of_a_singular_system(tmp_path):
 
 
 def test_a_name_of_a_picture_that_cannot_be_drawn_is_refused_before_anything_is_done(tmp_path):
-    with pytest.raises(UserError, match=r"--out matrix\.docx: the name of a picture ends in \.png, \.pdf, \.svg"):
+    with pytest.raises(UserError, match=r"out is matrix\.docx; a name that ends in \.png or \.pdf or \.svg"):
         limb_structure(tmp_path / "missing.yaml", "-o", "matrix.docx")
-    with pytest.raises(UserError, match="cannot be written"):
+    with pytest.raises(UserError, match="a folder that exists is needed"):
         limb_structure(PARAMS / "reference_joint.yaml", "-o", tmp_path / "nowhere" / "matrix.png")
 
 

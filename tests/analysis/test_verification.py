@@ -197,10 +197,10 @@ def test_a_case_that_cannot_be_solved_fails_without_a_number():
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--case", "3.12"], "--case is '3.12'; allowed: 3.2, 3.3"),
+        (["--case", "3.12"], "--case is '3.12'; one of 3.2, 3.3"),
         (["--whole", "--graph"], "not allowed with"),
         (["--limbs", "nowhere"], "nowhere/reference_joint.yaml: no such file"),
-        (["--figures", __file__], "cannot be made"),
+        (["--figures", __file__], "cannot be written"),
     ],
 )
 def test_impossible_wishes_end_with_one_line(capsys, arguments, said):

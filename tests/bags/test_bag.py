@@ -133,9 +133,9 @@ def test_raw_messages_pass_through(run: Path, tmp_path: Path) -> None:
         with BagReader(run) as again:
             expected = again.table("joint_torque")
     with BagReader(tmp_path / "copy") as bag:
-        found = bag.table("joint_torque")
+        result = bag.table("joint_torque")
     for name, column in expected.items():
-        np.testing.assert_array_equal(found[name], column)
+        np.testing.assert_array_equal(result[name], column)
 
 
 def test_types_that_are_not_known_are_read_from_the_bag(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_an_existing_folder_is_refused_and_left_as_it_is(tmp_path: Path) -> None
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="can't be made"):
+    with pytest.raises(UserError, match="cannot be made"):
         BagWriter(tmp_path / "file" / "run", INFO)
 
 
@@ -205,7 +205,10 @@ def test_a_name_that_fits_two_topics_is_refused(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "two", INFO) as bag:
         for side in "/left", "/right":
             bag.write(f"{side}/activation", 0, make_message(TOPIC_TYPES["activation"]))
-    with BagReader(tmp_path / "two") as reader, pytest.raises(UserError, match="which of /left/activation, /right/"):
+    with (
+        BagReader(tmp_path / "two") as reader,
+        pytest.raises(UserError, match="is there twice; one of /left/activation, /right/"),
+    ):
         reader.table("activation")
 
 
@@ -234,10 +237,10 @@ def test_messages_of_different_shape_make_no_table(tmp_path: Path) -> None:
     ("make", "said"),
     [
         (lambda path: None, "no such bag"),
-        (lambda path: path.mkdir(), "not a bag"),
-        (lambda path: path.write_text("text"), "not a bag"),
-        (lambda path: (path.mkdir(), (path / "metadata.yaml").write_text("{}")), "not a bag"),
-        (lambda path: (path.mkdir(), (path / "metadata.yaml").write_text("a: [")), "not a bag"),
+        (lambda path: path.mkdir(), "is no bag"),
+        (lambda path: path.write_text("text"), "is no bag"),
+        (lambda path: (path.mkdir(), (path / "metadata.yaml").write_text("{}")), "is no bag"),
+        (lambda path: (path.mkdir(), (path / "metadata.yaml").write_text("a: [")), "is no bag"),
         (lambda path: (path.mkdir(), (path / "a.mcap").write_text("")), "limb recover"),
     ],
 )

@@ -23,8 +23,8 @@ from limb_nodes.foundation.topics import TOPIC_TYPES
 RECORD_WITHOUT_END = """
 import sys
 from limb_nodes.bags.types import make_message
-from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.bags.write import BagWriter
+from limb_nodes.foundation.topics import TOPIC_TYPES
 
 bag = BagWriter(sys.argv[1], {"seed": 7}, flush_period=0.05)
 k = 0
@@ -94,16 +94,16 @@ def test_the_reader_says_how_to_recover(killed: tuple[Path, int]) -> None:
 def test_a_killed_recorder_leaves_all_but_the_last_moments(killed: tuple[Path, int], tmp_path: Path) -> None:
     path, on_disk = killed
     before = (path / "run.mcap").read_bytes()
-    found = recover(path, tmp_path / "out")
+    result = recover(path, tmp_path / "out")
     assert (path / "run.mcap").read_bytes() == before
-    assert found.truncated
-    assert sum(found.counts.values()) >= on_disk
+    assert result.truncated
+    assert sum(result.counts.values()) >= on_disk
     with BagReader(tmp_path / "out") as bag:
         assert bag.run_info() == {"seed": 7}
         table = bag.table("activation")
-    np.testing.assert_array_equal(table["tick"], np.arange(found.counts["/activation"]))
+    np.testing.assert_array_equal(table["tick"], np.arange(result.counts["/activation"]))
     np.testing.assert_array_equal(table["activation"][:, 0], table["tick"] * 1e-6)
-    assert found.end_ns == table["stamp"][-1]
+    assert result.end_ns == table["stamp"][-1]
 
 
 def test_a_file_cut_anywhere_gives_the_messages_before_the_cut(tmp_path: Path) -> None:
@@ -114,14 +114,14 @@ def test_a_file_cut_anywhere_gives_the_messages_before_the_cut(tmp_path: Path) -
         cut.mkdir()
         (cut / "cut.mcap").write_bytes(data[:size])
         try:
-            found = recover(cut, tmp_path / f"out{number}")
+            result = recover(cut, tmp_path / f"out{number}")
         except UserError as error:
-            assert "nothing to recover" in str(error)
+            assert "at least one is needed" in str(error)
             assert not counts
             continue
-        assert found.truncated
-        counts.append(found.counts["/activation"])
-        with BagReader(found.path) as bag:
+        assert result.truncated
+        counts.append(result.counts["/activation"])
+        with BagReader(result.path) as bag:
             assert bag.run_info() == {"seed": 1}
             np.testing.assert_array_equal(bag.table("activation")["tick"], np.arange(counts[-1]))
     assert counts == sorted(counts)
@@ -135,28 +135,28 @@ def test_damage_in_the_middle_ends_the_recovery_there(place: float, tmp_path: Pa
     data = bytearray(file.read_bytes())
     data[int(place * len(data))] ^= 0xFF
     file.write_bytes(data)
-    found = recover(tmp_path / "whole", tmp_path / "out")
-    assert found.truncated
+    result = recover(tmp_path / "whole", tmp_path / "out")
+    assert result.truncated
     # The chunks before the damaged one, whole.
-    assert found.counts["/activation"] == max(first for first in CHUNKS if first < place * CHUNKS[-1])
+    assert result.counts["/activation"] == max(first for first in CHUNKS if first < place * CHUNKS[-1])
     with BagReader(tmp_path / "out") as reader:
         assert reader.run_info() == {"seed": 1}
-        np.testing.assert_array_equal(reader.table("activation")["tick"], np.arange(found.counts["/activation"]))
+        np.testing.assert_array_equal(reader.table("activation")["tick"], np.arange(result.counts["/activation"]))
 
 
 def test_a_whole_bag_is_copied(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "whole", {"seed": 1}) as bag:
         bag.write("joint_states", 9, make_message(TOPIC_TYPES["joint_states"], 9, name=["knee"], position=[1.0]))
-    found = recover(tmp_path / "whole", tmp_path / "out")
-    assert not found.truncated
-    assert found.counts == {"/run_info": 1, "/joint_states": 1}
+    result = recover(tmp_path / "whole", tmp_path / "out")
+    assert not result.truncated
+    assert result.counts == {"/run_info": 1, "/joint_states": 1}
     with BagReader(tmp_path / "whole") as whole, BagReader(tmp_path / "out") as copy:
         assert whole.topics == copy.topics
         assert [c.ext for c in whole._reader.connections] == [c.ext for c in copy._reader.connections]
         assert [c.digest for c in whole._reader.connections] == [c.digest for c in copy._reader.connections]
 
 
-def test_nothing_is_written_where_there_is_nothing_to_recover(tmp_path: Path) -> None:
+def test_nothing_is_written_if_there_is_nothing_to_recover(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     for bag, said in ((tmp_path / "none", "no such bag"), (tmp_path / "empty", r"no \.mcap file")):
         with pytest.raises(UserError, match=said):

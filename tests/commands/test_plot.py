@@ -42,10 +42,10 @@ def test_pictures_of_three_kinds(
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        (["-o", "{tmp}/a.jpg"], "--out {tmp}/a.jpg: must end in .png, .pdf, .svg"),
-        (["-o", "{tmp}/no/a.png"], "--out {tmp}/no/a.png: no folder {tmp}/no; must be in a folder that exists"),
-        (["-o", "{tmp}/a.png", "--dpi", "0"], "--dpi 0: must be a number from 10 to 1200"),
-        (["-o", "{tmp}/a.png", "--dpi", "nan"], "--dpi nan: must be a number from 10 to 1200"),
+        (["-o", "{tmp}/a.jpg"], "--out is {tmp}/a.jpg; a name that ends in .png or .pdf or .svg is needed"),
+        (["-o", "{tmp}/no/a.png"], "--out is {tmp}/no/a.png; a folder that exists is needed, unlike {tmp}/no"),
+        (["-o", "{tmp}/a.png", "--dpi", "0"], "--dpi is 0; a number >= 10 and <= 1200 is needed"),
+        (["-o", "{tmp}/a.png", "--dpi", "nan"], "--dpi is nan; a number >= 10 and <= 1200 is needed"),
         (["-o", "{tmp}/a.png", "--from", "2"], "--from 2: {bag} ends at 1 s; must be less"),
         (["-o", "{tmp}/a.png", "--reference", "{tmp}/x"], "{tmp}/x: no such bag"),
         (["-o", "{tmp}/a.png", "--namespace", "x"], "{bag}: --namespace x: no such topics in the bag; it has /"),
@@ -76,7 +76,7 @@ def test_a_picture_is_overwritten_by_force_only(bag: Path, tmp_path: Path, capsy
     out = tmp_path / "a.png"
     out.write_bytes(b"mine")
     assert main(["plot", str(bag), "-o", str(out)]) == 2
-    assert capsys.readouterr().err.startswith(f"limb: error: --out {out}: exists already; ")
+    assert capsys.readouterr().err.startswith(f"limb: error: --out is {out}, which exists already; ")
     assert out.read_bytes() == b"mine"
     assert main(["plot", str(bag), "-o", str(out), "--force"]) == 0
     assert out.read_bytes() != b"mine"

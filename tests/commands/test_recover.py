@@ -56,8 +56,8 @@ def test_mistakes_are_one_line(whole: Path, tmp_path: Path, capsys: pytest.Captu
     empty.mkdir()
     for arguments, line in (
         ([str(tmp_path / "no"), "-o", str(out)], f"{tmp_path / 'no'}: no such bag"),
-        ([str(empty), "-o", str(out)], f"{empty}: nothing to recover: no .mcap file in it"),
-        ([str(whole), "-o", str(empty)], f"{empty}: exists already; give the name of a folder that does not"),
+        ([str(empty), "-o", str(out)], f"{empty}: holds no .mcap file; one is needed"),
+        ([str(whole), "-o", str(empty)], f"{empty}: exists already; the name of a new folder is needed"),
     ):
         assert main(["recover", *arguments]) == 2
         assert capsys.readouterr().err == f"limb: error: {line}\n"

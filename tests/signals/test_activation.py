@@ -36,17 +36,17 @@ def bag(tmp_path):
 
 
 def test_bag_is_taken_as_recorded(bag):
-    found = load_activation(bag(), MUSCLES, 100.0)
-    np.testing.assert_array_equal(found.values[:, 0], [1 - k / 10 for k in range(11)])
-    np.testing.assert_array_equal(found.values[:, 1], [k / 10 for k in range(11)])
-    assert found.names == ("flexor", "extensor")
-    assert (found.rate, found.duration) == (100.0, 0.1)
-    assert found.notes == ("not used, for the limb has no such muscle: other",)
+    result = load_activation(bag(), MUSCLES, 100.0)
+    np.testing.assert_array_equal(result.values[:, 0], [1 - k / 10 for k in range(11)])
+    np.testing.assert_array_equal(result.values[:, 1], [k / 10 for k in range(11)])
+    assert result.names == ("flexor", "extensor")
+    assert (result.rate, result.duration) == (100.0, 0.1)
+    assert result.notes == ("not used, for the limb has no such muscle: other",)
 
 
 def test_another_rate_is_interpolated(bag):
-    found = load_activation(bag(), MUSCLES, 250.0, 0.1)
-    np.testing.assert_allclose(found.values[:, 1], np.arange(26) / 25, atol=1e-12)
+    result = load_activation(bag(), MUSCLES, 250.0, 0.1)
+    np.testing.assert_allclose(result.values[:, 1], np.arange(26) / 25, atol=1e-12)
     slow = load_activation(bag(name="b"), MUSCLES, 20.0, 0.05)
     np.testing.assert_allclose(slow.values[:, 1], [0, 0.5], atol=1e-12)
 
@@ -68,22 +68,22 @@ def test_recorded_run_gives_what_drove_it(bag, tmp_path):
 
 
 def test_missing_ticks_are_bridged_and_noted(bag):
-    found = load_activation(bag(ticks=[0, 1, 2, 5, 6]), MUSCLES, 100.0)
-    np.testing.assert_allclose(found.values[:, 1], np.arange(7) / 10, atol=1e-12)
-    assert "ticks missing on emg_envelope, bridged by straight lines: 2" in found.notes
+    result = load_activation(bag(ticks=[0, 1, 2, 5, 6]), MUSCLES, 100.0)
+    np.testing.assert_allclose(result.values[:, 1], np.arange(7) / 10, atol=1e-12)
+    assert "ticks missing on emg_envelope, bridged by straight lines: 2" in result.notes
 
 
 def test_csv_may_be_uneven_and_start_late(write):
     source = write("time (ms)\tflexor\textensor\n100\t0\t1\n120\t0.2\t1\n150\t0.5\t0.25\n")
-    found = load_activation(source, MUSCLES, 100.0)
-    np.testing.assert_allclose(found.values[:, 0], np.arange(6) / 10, atol=1e-12)
-    np.testing.assert_allclose(found.values[:, 1], [1, 1, 1, 0.75, 0.5, 0.25], atol=1e-12)
-    assert found.notes == ("its times start at 0.1 s; counted from there",)
+    result = load_activation(source, MUSCLES, 100.0)
+    np.testing.assert_allclose(result.values[:, 0], np.arange(6) / 10, atol=1e-12)
+    np.testing.assert_allclose(result.values[:, 1], [1, 1, 1, 0.75, 0.5, 0.25], atol=1e-12)
+    assert result.notes == ("its times start at 0.1 s; counted from there",)
 
 
 def test_constants_in_a_line():
-    found = load_activation("flexor=0.9, extensor=0", MUSCLES, 50.0, 0.1)
-    np.testing.assert_array_equal(found.values, [[0.9, 0.0]] * 6)
+    result = load_activation("flexor=0.9, extensor=0", MUSCLES, 50.0, 0.1)
+    np.testing.assert_array_equal(result.values, [[0.9, 0.0]] * 6)
     many = [f"muscle_{k}" for k in range(60)]
     assert load_activation(",".join(f"{m}=0.5" for m in many), many, 1.0, 1.0).values.shape == (2, 60)
 
@@ -100,15 +100,21 @@ def bad(source, words, muscles=MUSCLES, rate=100.0, duration=None):
     ("text", "words"),
     [
         ("time,flexor\n0,0\n1,0\n", "no column 'extensor', a muscle of the limb; there are flexor"),
-        ("when,flexor,extensor\n0,0,0\n", "no column 'time' (s); there are when, flexor, extensor"),
-        ("time,flexor,extensor\n0,0,0\n1,1.5,0\n", "line 3, flexor: 1.5; must be a number in [0, 1]"),
-        ("time,flexor,extensor\n0,0,0\n1,0,-0.1\n", "line 3, extensor: -0.1; must be a number in [0, 1]"),
-        ("time,flexor,extensor\n0,0,0\n1,0,\n", "line 3, extensor: no value; must be a number in [0, 1]"),
-        ("time,flexor,extensor\n0,0,0\n1,0,nan\n", "line 3, extensor: no value"),
-        ("time,flexor,extensor\n0,0,0\n,0,0\n", "line 3, time: no value; must be later"),
-        ("time,flexor,extensor\n0,0,0\n1,0,0\n1,0,0\n", "line 4, time: 1 s; must be later than the one before"),
-        ("time,flexor,extensor\n,0,0\n1,0,0\n", "line 2, time: no value; must be later"),
-        ("time,flexor,extensor\n0,0,0\n", "lasts 0 s, less than one tick of 0.01 s"),
+        ("when,flexor,extensor\n0,0,0\n", "no column 'time' in s; there are when, flexor, extensor"),
+        ("time,flexor,extensor\n0,0,0\n1,1.5,0\n", "line 3: flexor is 1.5; a number in [0, 1] is needed"),
+        ("time,flexor,extensor\n0,0,0\n1,0,-0.1\n", "line 3: extensor is -0.1; a number in [0, 1] is needed"),
+        ("time,flexor,extensor\n0,0,0\n1,0,\n", "line 3: extensor is missing; a number in [0, 1] is needed"),
+        ("time,flexor,extensor\n0,0,0\n1,0,nan\n", "line 3: extensor is missing"),
+        (
+            "time,flexor,extensor\n0,0,0\n,0,0\n",
+            "line 3: time is missing; a number > 0, the time before,",
+        ),
+        (
+            "time,flexor,extensor\n0,0,0\n1,0,0\n1,0,0\n",
+            "line 4: time is 1; a number > 1, the time before,",
+        ),
+        ("time,flexor,extensor\n,0,0\n1,0,0\n", "line 2: time is missing; a number in s is needed"),
+        ("time,flexor,extensor\n0,0,0\n", "lasts 0 s; one tick of 0.01 s (rate 100 Hz) or more is needed"),
     ],
 )
 def test_bad_csv(write, text, words):
@@ -119,11 +125,11 @@ def test_bad_bags(bag, tmp_path):
     bad(bag("external", name="a"), "no message on activation or emg_envelope; the bag has /external")
     bad(bag(name="b"), "no column 'knee'", muscles=["knee"])
     values = [[0, 0, 0], [0, 0, float("nan")], [0, 0, 0]]
-    bad(bag(values=values, ticks=range(3), name="c"), "tick 1, flexor: no value; must be a number in [0, 1]")
+    bad(bag(values=values, ticks=range(3), name="c"), "tick 1: flexor is missing; a number in [0, 1] is needed")
     values[1][2] = 1.25
-    bad(bag(values=values, ticks=range(3), name="d"), "topic emg_envelope, tick 1, flexor: 1.25; must be a number")
+    bad(bag(values=values, ticks=range(3), name="d"), "topic emg_envelope, tick 1: flexor is 1.25; a number in [0, 1]")
     (tmp_path / "empty").mkdir()
-    bad(str(tmp_path / "empty"), "not a bag")
+    bad(str(tmp_path / "empty"), "is no bag")
 
 
 def test_unlisted_columns_may_hold_anything(write):
@@ -134,15 +140,15 @@ def test_unlisted_columns_may_hold_anything(write):
 @pytest.mark.parametrize(
     ("rate", "duration", "words"),
     [
-        (0.0, None, "rate 0: must be greater than 0"),
-        (float("nan"), None, "rate nan: must be greater than 0"),
-        (-1.0, None, "rate -1: must be greater than 0"),
-        (100.0, 0.0, "duration 0: must be greater than 0"),
-        (100.0, float("inf"), "duration inf: must be greater than 0"),
-        (100.0, 0.025, "duration 0.025: must be a whole number of ticks of 0.01 s"),
-        (100.0, 20.0, "lasts 0.1 s, shorter than the duration of 20 s"),
-        (1e15, None, "ticks; at most"),
-        (1e15, 1.0, "ticks; at most"),
+        (0.0, None, "rate is 0; a number > 0 in Hz is needed"),
+        (float("nan"), None, "rate is nan; a number > 0 in Hz is needed"),
+        (-1.0, None, "rate is -1; a number > 0 in Hz is needed"),
+        (100.0, 0.0, "duration is 0; a number > 0 in s is needed"),
+        (100.0, float("inf"), "duration is inf; a number > 0 in s is needed"),
+        (100.0, 0.025, "duration is 0.025; a whole number of ticks of 0.01 s is needed"),
+        (100.0, 20.0, "duration is 20; a number <= 0.1 in s is needed"),
+        (1e15, None, "at most 1e+08 ticks"),
+        (1e15, 1.0, "at most 1e+08 ticks"),
     ],
 )
 def test_impossible_rate_or_duration(bag, rate, duration, words):
@@ -152,11 +158,11 @@ def test_impossible_rate_or_duration(bag, rate, duration, words):
 @pytest.mark.parametrize(
     ("source", "words"),
     [
-        ("nowhere.csv", "activation 'nowhere.csv': no such file or folder"),
+        ("nowhere.csv", "source is 'nowhere.csv', which is no file; a bag, a CSV file"),
         ("flexor=0.9", "no muscle 'extensor', a muscle of the limb; there are flexor"),
-        ("flexor=0.9,extensor", "'extensor' is not MUSCLE=VALUE"),
-        ("flexor=0.9,extensor=", "'extensor=' is not MUSCLE=VALUE"),
-        ("flexor=0.9,flexor=0.1", "'flexor' stands twice"),
+        ("flexor=0.9,extensor", "flexor=0.9,extensor: 'extensor' is no constant; MUSCLE=VALUE"),
+        ("flexor=0.9,extensor=", "'extensor=' is no constant; MUSCLE=VALUE"),
+        ("flexor=0.9,flexor=0.1", "flexor is there twice; one value for each muscle is needed"),
         ("flexor=1.1,extensor=0", "flexor is 1.1; a number in [0, 1] is needed"),
         ("flexor=nan,extensor=0", "flexor is nan; a number in [0, 1] is needed"),
         ("flexor=x,extensor=0", "flexor is x; a number in [0, 1] is needed"),
@@ -167,4 +173,4 @@ def test_bad_lines(source, words):
 
 
 def test_constants_need_a_duration():
-    bad("flexor=0.9,extensor=0", "a waveform has no end; give a duration in s")
+    bad("flexor=0.9,extensor=0", "flexor=0.9,extensor=0: duration is missing; a number > 0 in s is needed")

@@ -44,18 +44,18 @@ def test_sine_is_clipped_at_zero_and_one(sample):
 
 
 def test_cosine_with_phase_and_mean(sample):
-    found = sample("{wave: cosine, mean: 0.5, amplitude: 0.5, frequency: 2, phase: 0.7, clip: false}")
-    np.testing.assert_allclose(found, 0.5 + 0.5 * np.cos(4 * np.pi * TIME + 0.7), atol=1e-12)
+    result = sample("{wave: cosine, mean: 0.5, amplitude: 0.5, frequency: 2, phase: 0.7, clip: false}")
+    np.testing.assert_allclose(result, 0.5 + 0.5 * np.cos(4 * np.pi * TIME + 0.7), atol=1e-12)
 
 
 def test_step_happens_at_its_time(sample):
-    found = sample("{wave: step, before: 0.1, after: 0.8, time: 0.5}")
-    np.testing.assert_array_equal(found, np.where(np.arange(201) < 50, 0.1, 0.8))
+    result = sample("{wave: step, before: 0.1, after: 0.8, time: 0.5}")
+    np.testing.assert_array_equal(result, np.where(np.arange(201) < 50, 0.1, 0.8))
 
 
 def test_ramp_is_straight_between_its_times(sample):
-    found = sample("{wave: ramp, start: 0, end: 1, start_time: 0.5, end_time: 1.5}")
-    np.testing.assert_allclose(found, np.clip(TIME - 0.5, 0, 1), atol=1e-12)
+    result = sample("{wave: ramp, start: 0, end: 1, start_time: 0.5, end_time: 1.5}")
+    np.testing.assert_allclose(result, np.clip(TIME - 0.5, 0, 1), atol=1e-12)
 
 
 def test_extra_muscles_are_noted(write):
@@ -64,16 +64,16 @@ def test_extra_muscles_are_noted(write):
 
 
 def test_shipped_sine_and_cosine_cross_the_threshold_where_the_report_has_them():
-    found = load_activation(str(PARAMS / "activation_sine_cosine.yaml"), ["flexor", "extensor"], 1000.0, 1.0)
+    result = load_activation(str(PARAMS / "activation_sine_cosine.yaml"), ["flexor", "extensor"], 1000.0, 1.0)
     time = np.arange(1001) / 1000
-    above = found.values >= 0.8
+    above = result.values >= 0.8
     np.testing.assert_array_equal(above[:, 0], np.sin(2 * np.pi * time) >= 0.8)
     np.testing.assert_array_equal(above[:, 1], np.cos(2 * np.pi * time) >= 0.8)
 
 
 def test_shipped_constants():
-    found = load_activation(str(PARAMS / "activation_constant.yaml"), ["flexor", "extensor"], 10.0, 1.0)
-    np.testing.assert_array_equal(found.values, [[0.9, 0.0]] * 11)
+    result = load_activation(str(PARAMS / "activation_constant.yaml"), ["flexor", "extensor"], 10.0, 1.0)
+    np.testing.assert_array_equal(result.values, [[0.9, 0.0]] * 11)
 
 
 @pytest.mark.parametrize(

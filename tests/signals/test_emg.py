@@ -1,15 +1,14 @@
 """From a recording to envelopes in a bag: the choice of channels, the options, the command."""
 
-import argparse
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from limb_nodes import cli
 from limb_nodes.bags.read import BagReader
 from limb_nodes.bags.types import limb_typestore, make_message
 from limb_nodes.bags.write import BagWriter
-from limb_nodes.commands import emg
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.signals.emg import EnvelopeOptions, envelopes, write_envelopes
@@ -34,27 +33,32 @@ def recording(**changes) -> Recording:
 
 
 def limb_emg(*arguments) -> int:
-    parser = argparse.ArgumentParser()
-    emg.add_parser(parser.add_subparsers())
-    return emg.run(parser.parse_args(["emg", *map(str, arguments)]))
+    return cli.main(["emg", *map(str, arguments)])
+
+
+def refusal(capsys, *arguments) -> str:
+    assert limb_emg(*arguments) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    return line
 
 
 def test_each_channel_reaches_its_own_maximum_once():
-    found = envelopes(recording())
-    assert found.names == ("RF", "VM")
-    assert found.values.shape == (SAMPLES, 2)
-    np.testing.assert_array_equal(found.values.max(axis=0), [1, 1])
-    assert found.values.min() >= 0
+    result = envelopes(recording())
+    assert result.names == ("RF", "VM")
+    assert result.values.shape == (SAMPLES, 2)
+    np.testing.assert_array_equal(result.values.max(axis=0), [1, 1])
+    assert result.values.min() >= 0
     # Noise of three times the amplitude has three times the envelope.
-    assert found.channels[1].maximum / found.channels[0].maximum == pytest.approx(3, rel=0.2)
-    assert [channel.clipped for channel in found.channels] == [0, 0]
+    assert result.channels[1].maximum / result.channels[0].maximum == pytest.approx(3, rel=0.2)
+    assert [channel.clipped for channel in result.channels] == [0, 0]
 
 
 def test_columns_that_are_no_emg_are_kept_as_angles_or_left_out_with_a_note():
-    found = envelopes(recording())
-    assert [channel.name for channel in found.angle_channels] == ["FX"]
-    np.testing.assert_allclose(found.angles[[0, -1], 0], [0, np.pi / 2])
-    assert found.notes == ("column 'force' is in N, neither EMG nor angle: left out",)
+    result = envelopes(recording())
+    assert [channel.name for channel in result.angle_channels] == ["FX"]
+    np.testing.assert_allclose(result.angles[[0, -1], 0], [0, np.pi / 2])
+    assert result.notes == ("column 'force' is in N, neither EMG nor angle: left out",)
 
 
 def test_given_maximum_scales_and_clips():
@@ -69,10 +73,10 @@ def test_given_maximum_scales_and_clips():
 
 def test_channels_are_selected_and_renamed():
     options = EnvelopeOptions(channels={"VM": "vastus"}, angles={"FX": "knee"}, skip=("force",))
-    found = envelopes(recording(), options)
-    assert found.names == ("vastus",)
-    assert found.angle_channels[0].name == "knee"
-    np.testing.assert_array_equal(found.values[:, 0], envelopes(recording()).values[:, 1])
+    result = envelopes(recording(), options)
+    assert result.names == ("vastus",)
+    assert result.angle_channels[0].name == "knee"
+    np.testing.assert_array_equal(result.values[:, 0], envelopes(recording()).values[:, 1])
     assert envelopes(recording(), EnvelopeOptions(skip=("RF", "FX"))).names == ("VM",)
 
 
@@ -80,18 +84,18 @@ def test_rest_level_becomes_zero_and_maximum_stays_one():
     quiet = recording()
     quiet.values[800:1400, 0] *= 0.1
     plain = envelopes(quiet).values[:, 0]
-    found = envelopes(quiet, EnvelopeOptions(rest=0.3))
+    result = envelopes(quiet, EnvelopeOptions(rest=0.3))
     rest = plain[900:1300].mean()
-    assert found.channels[0].rest / found.channels[0].maximum == pytest.approx(rest, rel=0.2)
-    assert found.values[900:1300, 0].mean() < 0.02 < rest
-    assert found.values[:, 0].max() == 1.0
+    assert result.channels[0].rest / result.channels[0].maximum == pytest.approx(rest, rel=0.2)
+    assert result.values[900:1300, 0].mean() < 0.02 < rest
+    assert result.values[:, 0].max() == 1.0
 
 
 def test_steps_can_be_left_out():
     options = EnvelopeOptions(band=None, rectify=False, low_pass=None, maximum={"RF": 2.0})
     raw = recording()
-    found = envelopes(raw, options)
-    np.testing.assert_allclose(found.values[:, 0], np.clip(raw.values[:, 0] / 2, 0, 1))
+    result = envelopes(raw, options)
+    np.testing.assert_allclose(result.values[:, 0], np.clip(raw.values[:, 0] / 2, 0, 1))
 
 
 def test_resampled_envelope_keeps_time_and_angle():
@@ -106,42 +110,46 @@ def test_gaps_are_counted_per_channel_and_hardly_matter():
     raw.values[500:503, 0] = np.nan
     raw.values[700, 0] = np.nan
     raw.values[:2, 2] = np.nan
-    found = envelopes(raw)
-    gaps = found.channels[0].gaps
+    result = envelopes(raw)
+    gaps = result.channels[0].gaps
     assert (gaps.count, gaps.samples, gaps.longest) == (2, 4, 3)
-    assert found.channels[1].gaps.count == 0
-    assert found.angle_channels[0].gaps.samples == 2
-    assert np.isfinite(found.values).all()
-    assert np.abs(found.values - envelopes(recording()).values).max() < 0.1
+    assert result.channels[1].gaps.count == 0
+    assert result.angle_channels[0].gaps.samples == 2
+    assert np.isfinite(result.values).all()
+    assert np.abs(result.values - envelopes(recording()).values).max() < 0.1
 
 
 @pytest.mark.parametrize(
     ("changes", "options", "words"),
     [
-        ({}, {"channels": {"XX": "a"}}, "no column 'XX' (--channel); there are RF, VM, FX, force"),
-        ({}, {"skip": ("XX",)}, "no column 'XX' (--skip)"),
-        ({}, {"maximum": {"XX": 1.0}}, "no column 'XX' (--maximum)"),
-        ({}, {"angles": {"XX": "a"}}, "no column 'XX' (--angle)"),
-        ({}, {"channels": {"FX": "a"}}, "column 'FX' (--channel) is in deg"),
-        ({}, {"angles": {"RF": "a"}}, "column 'RF' (--angle): mV; must be deg or rad"),
-        ({}, {"channels": {"RF": "a", "VM": "a"}}, "two columns would be named 'a'"),
-        ({}, {"channels": {"RF": "a"}, "maximum": {"VM": 1.0}}, "--maximum VM: not among the channels taken, RF"),
+        ({}, {"channels": {"XX": "a"}}, "made.txt: channels names 'XX'; one of RF, VM, FX, force is needed"),
+        ({}, {"skip": ("XX",)}, "skip names 'XX'; one of"),
+        ({}, {"maximum": {"XX": 1.0}}, "maximum names 'XX'; one of"),
+        ({}, {"angles": {"XX": "a"}}, "angles names 'XX'; one of"),
+        ({}, {"channels": {"FX": "a"}}, "channels names 'FX', which is in deg; a column in V, mV, uV"),
+        ({}, {"angles": {"RF": "a"}}, "angles names 'RF', which is in mV; a column in deg or rad is needed"),
+        ({}, {"channels": {"RF": "a", "VM": "a"}}, "channels names two columns 'a'; different names are needed"),
+        ({}, {"channels": {"RF": "a"}, "maximum": {"VM": 1.0}}, "maximum names 'VM'; one of RF is needed"),
         ({}, {"skip": ("RF", "VM")}, "no EMG channel is left"),
-        ({}, {"maximum": {"RF": 0.0}}, "--maximum RF=0: must be greater than 0"),
-        ({}, {"maximum": {"RF": float("nan")}}, "--maximum RF=nan: must be greater than 0"),
-        ({}, {"rest": -1.0}, "--rest -1: must be 0 s or more"),
-        ({}, {"rest": 60.0}, "--rest: rest of 60 s: longer than the recording of 2 s"),
-        ({}, {"rest": 0.5, "maximum": {"RF": 1e-9}}, "channel RF: maximum 1e-09; must be above the rest level"),
-        ({}, {"resample": 0.0}, "--resample 0: must be greater than 0"),
-        ({}, {"resample": 1e15}, "at most ten times the rate, 10000 Hz"),
-        ({}, {"resample": 10.0}, "--resample 10: must be twice the low-pass of 6 Hz or more"),
-        ({"rate": 500.0}, {}, "made.txt (500 Hz), --band-pass: filter corner 450 Hz: must lie between 0 and half"),
-        ({}, {"band": (float("nan"), 450.0)}, "--band-pass: band-pass nan 450 Hz: the lower edge"),
-        ({}, {"low_pass": 0.0}, "--low-pass: filter corner 0 Hz"),
-        ({}, {"band_order": 5}, "--band-pass: filter order 5: must be even"),
-        ({"values": recording().values[:30]}, {}, "--band-pass: 30 samples"),
-        ({"values": np.full((500, 4), np.nan)}, {}, "channel RF: nothing but missing values"),
-        ({"values": np.ones((500, 4))}, {}, "channel RF: every sample is 1"),
+        ({}, {"maximum": {"RF": 0.0}}, "maximum of RF is 0; a number > 0 is needed"),
+        ({}, {"maximum": {"RF": float("nan")}}, "maximum of RF is nan; a number > 0 is needed"),
+        ({}, {"rest": -1.0}, "rest is -1; a number >= 0 in s is needed"),
+        ({}, {"rest": 60.0}, "rest is 60; a number <= 2 in s, the whole recording"),
+        ({}, {"rest": 0.5, "maximum": {"RF": 1e-9}}, "the maximum of channel RF is 1e-09; a number >"),
+        ({}, {"resample": 0.0}, "resample is 0; a number >= 12"),
+        ({}, {"resample": 1e15}, "a number >= 12 and <= 10000 in Hz is needed"),
+        ({}, {"resample": 10.0}, "resample is 10; a number >= 12 and"),
+        ({"rate": 500.0}, {}, "made.txt (500 Hz): band corner is 450; a number > 0 and < 250 in Hz"),
+        ({}, {"band": (float("nan"), 450.0)}, "band edges are nan and 450; a lower"),
+        ({}, {"low_pass": 0.0}, "low_pass corner is 0; a number > 0"),
+        ({}, {"band_order": 5}, "band order is 5; an even number from 2 to 12"),
+        (
+            {"values": recording().values[:30]},
+            {},
+            "band corner is 20; 50 samples, one period of it,",
+        ),
+        ({"values": np.full((500, 4), np.nan)}, {}, "channel RF holds no value; at least one is needed"),
+        ({"values": np.ones((500, 4))}, {}, "channel RF is 1 everywhere"),
     ],
 )
 def test_bad_options_are_named(changes, options, words):
@@ -187,13 +195,13 @@ def test_every_message_is_as_if_written_by_itself(tmp_path):
     raw = recording(rate=900.0)
     raw.values[:, 3] *= np.linspace(-30, 30, SAMPLES)
     raw = replace(raw, units=("mV", "uV", "deg", "rad"))
-    found = envelopes(raw, EnvelopeOptions(band=(20.0, 400.0)))
-    write_envelopes(found, tmp_path / "env")
+    result = envelopes(raw, EnvelopeOptions(band=(20.0, 400.0)))
+    write_envelopes(result, tmp_path / "env")
     with BagReader(tmp_path / "env") as bag:
         rows = {topic: list(bag.read_topic(topic)) for topic in ("emg_envelope", "reference_angle")}
     for topic, fields, values in (
-        ("emg_envelope", {"name": ["RF", "VM"], "last_tick": SAMPLES - 1}, {"activation": found.values}),
-        ("reference_angle", {"name": ["FX", "force"]}, {"position": found.angles}),
+        ("emg_envelope", {"name": ["RF", "VM"], "last_tick": SAMPLES - 1}, {"activation": result.values}),
+        ("reference_angle", {"name": ["FX", "force"]}, {"position": result.angles}),
     ):
         assert len(rows[topic]) == SAMPLES
         for tick, (stamp, message) in enumerate(rows[topic]):
@@ -225,30 +233,27 @@ def test_bag_of_raw_emg_gives_the_same_envelopes(raw_file, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--rate", "1000", "--maximum", "RF"], "--maximum RF: must be COLUMN=VALUE"),
-        (["--rate", "1000", "--maximum", "RF=high"], "--maximum RF=high: 'high' is not a number"),
-        (["--rate", "1000", "--channel", "RF", "--channel", "RF=a"], "column 'RF' is named twice"),
-        (["--rate", "1000", "--channel", "RF="], "--channel RF=: must be COLUMN[=NAME]"),
-        (["--rate", "100"], "--band-pass: filter corner 450 Hz"),
-        ([], "give --rate HZ"),
+        (["--rate", "1000", "--maximum", "RF"], "--maximum is RF; COLUMN=VALUE is needed"),
+        (["--rate", "1000", "--maximum", "RF=high"], "--maximum of RF is 'high'; a number > 0 is needed"),
+        (["--rate", "1000", "--channel", "RF", "--channel", "RF=a"], "--channel names 'RF' twice"),
+        (["--rate", "1000", "--channel", "RF="], "--channel is RF=; COLUMN[=NAME] is needed"),
+        (["--rate", "100"], "(100 Hz): --band-pass corner is 450; a number > 0 and < 50 in Hz"),
+        ([], "--rate is missing: there are no times, and the header states no samples per second; a number > 0"),
     ],
 )
-def test_nothing_is_written_where_something_is_wrong(raw_file, tmp_path, arguments, words):
-    with pytest.raises(UserError) as error:
-        limb_emg(raw_file, "-o", tmp_path / "env", *arguments)
-    assert words in str(error.value)
+def test_nothing_is_written_if_something_is_wrong(raw_file, tmp_path, capsys, arguments, words):
+    assert words in refusal(capsys, raw_file, "-o", tmp_path / "env", *arguments)
     assert not (tmp_path / "env").exists()
 
 
-def test_existing_output_is_refused_and_kept(raw_file, tmp_path):
+def test_existing_output_is_refused_and_kept(raw_file, tmp_path, capsys):
     (tmp_path / "env").mkdir()
     (tmp_path / "env" / "mine.txt").write_text("kept")
-    with pytest.raises(UserError, match="exists already"):
-        limb_emg(raw_file, "-o", tmp_path / "env", "--rate", 1000)
+    assert "exists already" in refusal(capsys, raw_file, "-o", tmp_path / "env", "--rate", 1000)
     assert (tmp_path / "env" / "mine.txt").read_text() == "kept"
 
 
-def test_bag_without_the_topic_says_what_there_is(raw_file, tmp_path):
+def test_bag_without_the_topic_says_what_there_is(raw_file, tmp_path, capsys):
     limb_emg(raw_file, "-o", tmp_path / "env", "--rate", 1000)
-    with pytest.raises(UserError, match=r"no message on emg_raw; the bag has /emg_envelope, /reference_angle"):
-        limb_emg(tmp_path / "env", "-o", tmp_path / "again")
+    line = refusal(capsys, tmp_path / "env", "-o", tmp_path / "again")
+    assert "no message on emg_raw; the bag has /emg_envelope, /reference_angle" in line

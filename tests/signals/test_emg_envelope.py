@@ -71,10 +71,10 @@ def test_modulated_noise_gives_back_its_modulation():
     carrier = sosfiltfilt(butter(4, [60, 300], "band", fs=RATE, output="sos"), rng.normal(size=(6000, 200)), axis=0)
     carrier /= carrier.std()
     raw = modulation[:, None] * carrier
-    found = low_pass(rectify(band_pass(raw, RATE, (20.0, 450.0))), RATE).mean(axis=1)
+    result = low_pass(rectify(band_pass(raw, RATE, (20.0, 450.0))), RATE).mean(axis=1)
     expected = np.sqrt(2 / np.pi) * modulation
-    assert np.abs(found - expected)[300:-300].max() < 0.03
-    assert np.abs(found - expected).max() < 0.06
+    assert np.abs(result - expected)[300:-300].max() < 0.03
+    assert np.abs(result - expected).max() < 0.06
 
 
 def test_constant_amplitude_has_no_transient_at_the_ends():
@@ -86,16 +86,19 @@ def test_constant_amplitude_has_no_transient_at_the_ends():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda x: band_pass(x, RATE, (20.0, 500.0)), "500 Hz: must lie between 0 and half the rate"),
-        (lambda x: band_pass(x, RATE, (0.0, 450.0)), "0 Hz: must lie"),
-        (lambda x: band_pass(x, RATE, (450.0, 20.0)), "lower edge must be below"),
-        (lambda x: band_pass(x, RATE, (float("nan"), 20.0)), "lower edge must be below"),
-        (lambda x: low_pass(x, RATE, 6.0, 3), "order 3: must be even"),
-        (lambda x: low_pass(x[:100], RATE, 6.0), "needs one period at least, 167"),
-        (lambda x: rest_level(x, RATE, 9.0), "longer than the recording"),
+        (
+            lambda x: band_pass(x, RATE, (20.0, 500.0)),
+            "a number > 0 and < 500 in Hz, half the rate,",
+        ),
+        (lambda x: band_pass(x, RATE, (0.0, 450.0)), "corner is 0; a number > 0"),
+        (lambda x: band_pass(x, RATE, (450.0, 20.0)), "a lower and then a higher number"),
+        (lambda x: band_pass(x, RATE, (float("nan"), 20.0)), "a lower and then a higher number"),
+        (lambda x: low_pass(x, RATE, 6.0, 3), "order is 3; an even number"),
+        (lambda x: low_pass(x[:100], RATE, 6.0), "corner is 6; 167 samples, one period of it"),
+        (lambda x: rest_level(x, RATE, 9.0), "is 9; a number <= 8 in s"),
         (lambda x: normalise(x, np.array([0.0])), "not above its rest level"),
-        (lambda x: resample(x, RATE, 0.0), "greater than 0"),
-        (lambda x: bridge_gaps(np.full(3, np.nan)), "no finite sample"),
+        (lambda x: resample(x, RATE, 0.0), "a number > 0"),
+        (lambda x: bridge_gaps(np.full(3, np.nan)), "no sample is finite"),
     ],
 )
 def test_impossible_arguments_are_named(call, words):

@@ -67,7 +67,7 @@ def test_rows_that_are_not_there_become_gaps(write):
     assert recording.notes == ("rows missing between the first and the last time: 2",)
 
 
-def test_rate_is_given_where_there_are_no_times(write):
+def test_rate_is_given_if_there_are_no_times(write):
     recording = read_recording(write("# from the lab\nRF,VM\r\n1,2\r\n3,nan\r\n\r\n"), rate=500.0)
     assert recording.rate == 500.0
     np.testing.assert_array_equal(recording.values, [[1, 2], [3, np.nan]])
@@ -83,28 +83,32 @@ def test_byte_order_mark_and_latin_text_are_read(write):
     [
         ("", None, "the file is empty"),
         ("RF,VM\n", 1000.0, "no rows below the header"),
-        ("1,2\n3,4\n", 1000.0, "line 1: numbers where the header is expected"),
-        ("RF,VM\n1,2\n3\n", 1000.0, "line 3: 1 columns; the header has 2"),
-        ("RF,VM\n1,2\n3,x4\n", 1000.0, "line 3, column VM: 'x4' is not a number"),
-        ("RF,VM\n1,2\n3,inf\n", 1000.0, "line 3, column VM: 'inf' is not finite"),
-        ("RF,RF\n1,2\n", 1000.0, "line 1: the column name 'RF' stands twice"),
+        ("1,2\n3,4\n", 1000.0, "line 1: is a row of numbers; names, for example time,RF,VM, are needed"),
+        ("RF,VM\n1,2\n3\n", 1000.0, "line 3: holds 1 columns; 2 are needed"),
+        ("RF,VM\n1,2\n3,x4\n", 1000.0, "line 3: VM is 'x4'; a finite number is needed"),
+        ("RF,VM\n1,2\n3,inf\n", 1000.0, "line 3: VM is 'inf'; a finite number is needed"),
+        ("RF,RF\n1,2\n", 1000.0, "line 1: two columns are named 'RF'; different names"),
         ("RF,\n1,2\n", 1000.0, "line 1: column 2 has no name"),
-        ("RF,VM\n1,2\n", None, "no column of times and no rate; give --rate"),
-        ("RF,VM\n1,2\n", 0.0, "rate 0: must be greater than 0"),
-        ("RF,VM\n1,2\n", float("nan"), "rate nan: must be greater than 0"),
-        ("RF,VM\n,\n,nan\n", 1000.0, "nothing but missing values"),
-        ("time,RF\n0,1\n", None, "one row; at least two"),
+        ("RF,VM\n1,2\n", None, "rate is missing: there are no times, and the header states no samples per second"),
+        ("RF,VM\n1,2\n", 0.0, "rate is 0; a number > 0 and <= 1e+06 in Hz is needed"),
+        ("RF,VM\n1,2\n", float("nan"), "rate is nan; a number > 0"),
+        ("RF,VM\n,\n,nan\n", 1000.0, "holds no value; at least one sample is needed"),
+        ("time,RF\n0,1\n", None, "holds one row; at least 2"),
         ("time\n0\n1\n", None, "no column beside the times"),
-        ("time,RF\n0,1\n,2\n2,3\n", None, "line 3: the time is missing"),
-        ("time,RF\n0,1\n1,2\n1,3\n", None, "line 4: time 1 s; must be later"),
-        ("time,RF\n" + "".join(f"{t},1\n" for t in (0, 1, 2, 2.6, 3, 4.4, 5.8, 7.2)), None, "must be evenly spaced"),
-        ("time,RF\n0,1\n0.001,2\n0.002,2\n", 100.0, "the times give 1000 Hz, not the rate of 100 Hz"),
-        ("RF\n" + "1" * 200_000, 1000.0, "line 2: not a row of numbers (field larger"),
-        ("R" * 200_000 + "\n1", 1000.0, "line 1: not a line of column names (field larger"),
-        ("RF\n" + "x" * 1000, 1000.0, "xxx... is not a number"),
-        (b"RF\0\0\n", 1000.0, "not a text file"),
-        (CHANNELS.replace("from 50 to 1000 samples per second", ""), None, "does not state samples per second"),
-        (CHANNELS.replace("'FX'", "'RF'"), None, "'RF' stands twice"),
+        ("time,RF\n0,1\n,2\n2,3\n", None, "line 3: time is missing; a number > 0, the time before,"),
+        ("time,RF\n0,1\n1,2\n1,3\n", None, "line 4: time is 1; a number > 1, the time before,"),
+        (
+            "time,RF\n" + "".join(f"{t},1\n" for t in (0, 1, 2, 2.6, 3, 4.4, 5.8, 7.2)),
+            None,
+            "line 6: time is 3; times at an even distance",
+        ),
+        ("time,RF\n0,1\n0.001,2\n0.002,2\n", 100.0, "rate is 100; 1000 in Hz is needed, as the times say, or no rate"),
+        ("RF\n" + "1" * 200_000, 1000.0, "line 2: is no row of numbers: field larger"),
+        ("R" * 200_000 + "\n1", 1000.0, "line 1: is no line of column names: field larger"),
+        ("RF\n" + "x" * 1000, 1000.0, "xxx...; a finite number"),
+        (b"RF\0\0\n", 1000.0, "is no text file"),
+        (CHANNELS.replace("from 50 to 1000 samples per second", ""), None, "the header states no samples per second"),
+        (CHANNELS.replace("'FX'", "'RF'"), None, "two columns are named 'RF'"),
         (CHANNELS[: CHANNELS.index("0.1")], None, "no rows below the header"),
     ],
 )
@@ -115,7 +119,7 @@ def test_bad_files_are_named_with_the_place(write, text, rate, words):
     line = str(error.value)
     assert words in line
     assert "\n" not in line
-    if "rate 0" not in words and "rate nan" not in words:
+    if "rate is" not in words or "missing" in words:
         assert line.startswith(path)
 
 
