@@ -47,12 +47,15 @@ def equation(number: str, defines: str) -> Callable[[ScalarFunction], ScalarFunc
     return mark
 
 
-def equation_of(function: ScalarFunction) -> Equation:
-    """The equation that `equation` attached to a function."""
-    found = function.__dict__.get("equation")
-    if not isinstance(found, Equation):
-        raise TypeError(f"{function.__name__} is not marked with @equation")
-    return found
+def equation_of(function: ScalarFunction | Equation) -> Equation:
+    """The equation that a function is marked as; an `Equation` stands for itself.
+
+    Raises TypeError for a function that is not marked with `equation`.
+    """
+    marked = function if isinstance(function, Equation) else function.__dict__.get("equation")
+    if not isinstance(marked, Equation):
+        raise TypeError(f"{getattr(function, '__name__', function)} is not marked; @equation is needed")
+    return marked
 
 
 @dataclass(frozen=True)
@@ -79,16 +82,27 @@ class Law:
     """One model of one process, chosen by name in a limb's YAML.
 
     process: key of the contract that the law fulfils (see `limb_nodes.levels.contracts`).
-    equations: the law's equations; together they define what the contract asks for.
+    functions: the law's equations, functions marked with `equation`; together they define what the contract asks
+        for, the last one the characteristic that the law is known by.
+    states: what the law integrates. ranges: by variable, over which the law is checked.
     """
 
     process: str
     name: str
-    equations: tuple[Equation, ...]
+    functions: tuple[ScalarFunction | Equation, ...]
     parameters: tuple[Parameter, ...] = ()
     states: tuple[State, ...] = ()
     source: str = ""
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict, hash=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Raises TypeError for a function that is not marked with `equation`."""
+        assert self.equations is not None
+
+    @cached_property
+    def equations(self) -> tuple[Equation, ...]:
+        """The law's equations."""
+        return tuple(map(equation_of, self.functions))
 
     def __call__(self, *values: float) -> float:
         """Evaluate the law's last equation: the characteristic that the law is known by."""

@@ -275,11 +275,11 @@ def test_bad_value(case):
 
 def test_a_law_of_ones_own_beside_the_limb(tmp_path):
     (tmp_path / "my_tendon.py").write_text(
-        "from limb_nodes.levels import Parameter, State, Law, equation, equation_of\n"
+        "from limb_nodes.levels import Parameter, State, Law, equation\n"
         "@equation('own', 'tendon_velocity')\n"
         "def velocity(tendon_force, tendon_length, rest):\n"
         "    return -1e-4 * tendon_force - 10.0 * (tendon_length - rest)\n"
-        "soft = Law('tendon', 'soft', (equation_of(velocity),), (Parameter('rest', 'm', 'length', above=0.0),),\n"
+        "soft = Law('tendon', 'soft', (velocity,), (Parameter('rest', 'm', 'length', above=0.0),),\n"
         "    (State('tendon_length', 'tendon_velocity', 'own', 'rest', 0.01, 'm'),))\n"
         "raise_later = 3\n"
     )

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from limb_nodes.analysis.structure.relations import Assembly, Relation, Term, Variable, relate, substitute
-from limb_nodes.levels import Equation, equation_of
+from limb_nodes.levels.equation import ScalarFunction, equation_of
 from limb_nodes.levels.limb import chain, original, transformed
 from limb_nodes.model import Limb
 
@@ -21,6 +21,7 @@ ABBREVIATIONS = (
     "inertia_coupling",
 )
 NONE: tuple[Term, ...] = ()
+Given = Mapping[str, Iterable[Term]]
 
 
 def of(owner: str, *names: str, order: int = 0) -> tuple[Term, ...]:
@@ -60,8 +61,9 @@ def original_relations(limb: Limb) -> list[Relation]:
     """Every segment as a free body."""
     relations: list[Relation] = []
 
-    def add(owner: str, item: Equation, given: dict[str, Iterable[Term]], defines: Term | None = None) -> None:
-        (target,) = (defines,) if defines else of(owner, item.defines)
+    def add(owner: str, function: ScalarFunction, given: Given, defines: Term | None = None) -> None:
+        item = equation_of(function)
+        target = defines or of(owner, item.defines)[0]
         constants = dict.fromkeys(("mass", "inertia", "length", "com_distance", "gravity_x", "gravity_y"), NONE)
         relations.append(relate(item, ORIGINAL, owner, target, {**constants, **given}))
 
@@ -73,16 +75,16 @@ def original_relations(limb: Limb) -> list[Relation]:
         }
         following = names[k + 1] if k + 1 < len(names) else None
         angle, velocity = of(name, "segment_angle", order=1)[0], of(name, "segment_velocity", order=1)[0]
-        add(name, equation_of(original.segment_angle_rate), dict(own), angle)
+        add(name, original.segment_angle_rate, own, angle)
         if following is None:
             turning = {**own, **TIP_FORCE, "tip_torque": TIP_TORQUE}
-            add(name, equation_of(original.last_segment_velocity_rate), dict(turning), velocity)
+            add(name, original.last_segment_velocity_rate, turning, velocity)
         else:
             carried = {
                 f"next_{variable}": of(following, variable)
                 for variable in ("joint_torque", "joint_force_x", "joint_force_y")
             }
-            add(name, equation_of(original.segment_velocity_rate), {**own, **carried}, velocity)
+            add(name, original.segment_velocity_rate, {**own, **carried}, velocity)
         for axis, speed, push, force, last_force, point in (
             (
                 "x",
@@ -111,19 +113,18 @@ def original_relations(limb: Limb) -> list[Relation]:
                 f"next_joint_force_{axis}": pulls,
                 **TIP_FORCE,
             }
-            add(name, equation_of(speed), dict(rates))
-            add(name, equation_of(push), dict(rates))
-            add(name, equation_of(force if following else last_force), dict(given))
+            add(name, speed, rates)
+            add(name, push, rates)
+            add(name, force if following else last_force, given)
             # 2.65 sums over the segments before; the chain of joint positions is put in below.
             place = {
                 f"origin_{axis}": of(name, f"joint_position_{axis}") if k else NONE,
                 "distance": NONE,
                 "segment_angle": of(name, "segment_angle"),
             }
-            item = equation_of(point)
-            add(name, item, dict(place), of(name, f"com_position_{axis}")[0])
+            add(name, point, place, of(name, f"com_position_{axis}")[0])
             if following:
-                add(name, item, dict(place), of(following, f"joint_position_{axis}")[0])
+                add(name, point, place, of(following, f"joint_position_{axis}")[0])
     return substitute(relations, ("joint_position_x", "joint_position_y"))
 
 
@@ -131,15 +132,15 @@ def transformed_relations(limb: Limb) -> list[Relation]:
     """Segment angles and velocities alone (3.10, 3.11), with A, M, F and G put into 3.11."""
     relations: list[Relation] = []
 
-    def add(owner: str, item: Equation, given: dict[str, Iterable[Term]], defines: Term) -> None:
-        relations.append(relate(item, TRANSFORMED, owner, defines, given))
+    def add(owner: str, function: ScalarFunction, given: Given, defines: Term) -> None:
+        relations.append(relate(equation_of(function), TRANSFORMED, owner, defines, given))
 
     names = [segment.name for segment in limb.segments]
     for k, name in enumerate(names):
         angle = of(name, "segment_angle")
         add(
             name,
-            equation_of(transformed.segment_angle_rate),
+            transformed.segment_angle_rate,
             {"segment_velocity": of(name, "segment_velocity")},
             of(name, "segment_angle", order=1)[0],
         )
@@ -147,27 +148,27 @@ def transformed_relations(limb: Limb) -> list[Relation]:
         (net,) = of(name, "net_torque")
         if k + 1 < len(names):
             following = {"next_joint_torque": of(names[k + 1], "joint_torque")}
-            add(name, equation_of(transformed.net_torque), {**torque, **following}, net)
+            add(name, transformed.net_torque, {**torque, **following}, net)
         else:
-            add(name, equation_of(transformed.last_net_torque), {**torque, "tip_torque": TIP_TORQUE}, net)
+            add(name, transformed.last_net_torque, {**torque, "tip_torque": TIP_TORQUE}, net)
         directions = {"cosine": angle, "sine": angle}
         gravity = {"first_moment": NONE, "gravity_x": NONE, "gravity_y": NONE}
-        add(name, equation_of(chain.gravity_torque), {**gravity, **directions}, of(name, "gravity_torque")[0])
+        add(name, chain.gravity_torque, {**gravity, **directions}, of(name, "gravity_torque")[0])
         tip = {"length": NONE, **TIP_FORCE, **directions}
-        add(name, equation_of(chain.tip_force_torque), dict(tip), of(name, "tip_force_torque")[0])
+        add(name, chain.tip_force_torque, tip, of(name, "tip_force_torque")[0])
         inertial, centrifugal = [], []
         for other in names:
             pair = f"{name}, {other}"
             both = (*angle, *of(other, "segment_angle")) if other != name else NONE
             coupling, motion, turn = of(pair, "inertia_coupling", "inertial_torque", "centrifugal_torque")
             given = {"coupling": NONE, "cosine": both}
-            add(pair, equation_of(chain.inertia_coupling), dict(given), coupling)
+            add(pair, chain.inertia_coupling, given, coupling)
             given = {"inertia_coupling": (coupling,), "segment_velocity_rate": of(other, "segment_velocity", order=1)}
-            add(pair, equation_of(transformed.inertial_torque), dict(given), motion)
+            add(pair, transformed.inertial_torque, given, motion)
             inertial.append(motion)
             if other != name:
                 given = {"coupling": NONE, "sine": both, "segment_velocity": of(other, "segment_velocity")}
-                add(pair, equation_of(chain.centrifugal_torque), dict(given), turn)
+                add(pair, chain.centrifugal_torque, given, turn)
                 centrifugal.append(turn)
         row = {
             "net_torque": (net,),
@@ -176,5 +177,5 @@ def transformed_relations(limb: Limb) -> list[Relation]:
             "inertial_torque": inertial,
             "centrifugal_torque": centrifugal,
         }
-        add(name, equation_of(transformed.torque_residual), dict(row), of(name, "segment_velocity", order=1)[0])
+        add(name, transformed.torque_residual, row, of(name, "segment_velocity", order=1)[0])
     return substitute(relations, ABBREVIATIONS)

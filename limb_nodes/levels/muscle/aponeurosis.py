@@ -15,7 +15,7 @@ import math
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, State, equation, equation_of
+from limb_nodes.levels.equation import Law, State, equation
 
 
 @equation("2.51", "pennation_angle")
@@ -117,14 +117,11 @@ none = register(
     Law(
         "aponeurosis",
         "none",
-        tuple(
-            equation_of(function)
-            for function in (
-                parallel_pennation_angle,
-                parallel_fibre_length,
-                parallel_fibre_velocity,
-                parallel_muscle_force,
-            )
+        (
+            parallel_pennation_angle,
+            parallel_fibre_length,
+            parallel_fibre_velocity,
+            parallel_muscle_force,
         ),
         source="fibres along the line of pull",
     )
@@ -133,18 +130,15 @@ constant_area = register(
     Law(
         "aponeurosis",
         "constant_area",
-        tuple(
-            equation_of(function)
-            for function in (
-                pennation_angle,
-                fibre_length,
-                aponeurosis_angle,
-                fibre_angle,
-                aponeurosis_force,
-                aponeurosis_velocity,
-                fibre_velocity,
-                muscle_force,
-            )
+        (
+            pennation_angle,
+            fibre_length,
+            aponeurosis_angle,
+            fibre_angle,
+            aponeurosis_force,
+            aponeurosis_velocity,
+            fibre_velocity,
+            muscle_force,
         ),
         (
             Parameter(

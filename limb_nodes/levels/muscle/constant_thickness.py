@@ -8,7 +8,7 @@ import math
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, equation, equation_of
+from limb_nodes.levels.equation import Law, equation
 
 
 @equation("alpha", "pennation_angle")
@@ -39,7 +39,7 @@ constant_thickness = register(
     Law(
         "aponeurosis",
         "constant_thickness",
-        tuple(equation_of(function) for function in (pennation_angle, fibre_length, fibre_velocity, muscle_force)),
+        (pennation_angle, fibre_length, fibre_velocity, muscle_force),
         (
             Parameter(
                 "thickness",

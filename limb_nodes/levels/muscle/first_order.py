@@ -5,7 +5,7 @@ Symbols of the paper: u excitation, a activation, tau_act rise_time, tau_deact f
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, State, equation, equation_of
+from limb_nodes.levels.equation import Law, State, equation
 
 
 @equation("Thelen 1-2", "activation_rate")
@@ -25,7 +25,7 @@ first_order = register(
     Law(
         "activation_dynamics",
         "first_order",
-        (equation_of(activation_rate),),
+        (activation_rate,),
         (
             Parameter(
                 "rise_time",

@@ -4,7 +4,7 @@ Report symbols: r_M moment_arm, l_M+T muscle_tendon_length, alpha joint_angle.
 """
 
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, equation, equation_of
+from limb_nodes.levels.equation import Law, equation
 from limb_nodes.levels.muscle.path import GEOMETRY, PARAMETERS
 
 
@@ -21,7 +21,7 @@ geometric_moment_arm = register(
     Law(
         "path",
         "geometric_moment_arm",
-        (*GEOMETRY, equation_of(moment_arm)),
+        (*GEOMETRY, moment_arm),
         PARAMETERS,
         source="An, Takahashi, Harrigan and Chao, J Biomech Eng 106 (1984) 280",
     )

@@ -9,7 +9,7 @@ import math
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, equation, equation_of
+from limb_nodes.levels.equation import Law, equation
 
 
 @equation("2.43-2.44", "muscle_tendon_length")
@@ -86,13 +86,13 @@ PARAMETERS = (
         below=10.0,
     ),
 )
-GEOMETRY = tuple(equation_of(function) for function in (muscle_tendon_length, path_slope, muscle_tendon_velocity))
+GEOMETRY = (muscle_tendon_length, path_slope, muscle_tendon_velocity)
 
 constant_moment_arm = register(
     Law(
         "path",
         "constant_moment_arm",
-        (*GEOMETRY, equation_of(constant_arm)),
+        (*GEOMETRY, constant_arm),
         PARAMETERS,
         source="report, assumption 2",
     )

@@ -4,7 +4,7 @@ The bench hands over the muscle-tendon length as the joint's angle and its rate 
 joint's velocity. Not among the laws that a limb's file can choose: over a joint it means nothing.
 """
 
-from limb_nodes.levels.equation import Law, equation, equation_of
+from limb_nodes.levels.equation import Law, equation
 
 
 @equation("prescribed length", "muscle_tendon_length")
@@ -28,6 +28,6 @@ def unit_arm() -> float:
 prescribed = Law(
     "path",
     "prescribed",
-    tuple(equation_of(function) for function in (prescribed_length, prescribed_velocity, unit_arm)),
+    (prescribed_length, prescribed_velocity, unit_arm),
     source="a muscle on a bench",
 )

@@ -6,7 +6,7 @@ F_T tendon_force, D_T stiffness, C_T damping, l_T^slack slack_length.
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, State, equation, equation_of
+from limb_nodes.levels.equation import Law, State, equation
 
 
 @equation("2.30", "tendon_velocity")
@@ -65,7 +65,7 @@ rigid = register(
     Law(
         "tendon",
         "rigid",
-        (equation_of(rigid_length), equation_of(rigid_velocity)),
+        (rigid_length, rigid_velocity),
         (
             Parameter(
                 "slack_length",
@@ -84,7 +84,7 @@ voigt = register(
     Law(
         "tendon",
         "voigt",
-        (equation_of(voigt_velocity),),
+        (voigt_velocity,),
         (
             Parameter(
                 "stiffness",

@@ -9,7 +9,7 @@ import math
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, equation, equation_of
+from limb_nodes.levels.equation import Law, equation
 from limb_nodes.levels.muscle.tendon import DAMPING, INITIAL_LENGTH, LENGTH_STATE
 
 
@@ -48,7 +48,7 @@ toe_region = register(
     Law(
         "tendon",
         "toe_region",
-        (equation_of(toe_strain), equation_of(elastic_tendon_force), equation_of(toe_velocity)),
+        (toe_strain, elastic_tendon_force, toe_velocity),
         (
             Parameter(
                 "slack_length",

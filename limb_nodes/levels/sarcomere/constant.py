@@ -2,7 +2,7 @@
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, equation, equation_of
+from limb_nodes.levels.equation import Law, equation
 
 
 @equation("maximum_force", "maximum_sarcomere_force")
@@ -21,7 +21,7 @@ constant = register(
     Law(
         "sarcomere",
         "constant",
-        (equation_of(maximum_sarcomere_force), equation_of(sarcomere_force)),
+        (maximum_sarcomere_force, sarcomere_force),
         (Parameter("force", "N", "force of the sarcomere", 9.7778e-13, above=0.0),),
         source="report, 3.3.1: muscles of constant force",
     )

@@ -13,7 +13,7 @@ import math
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, equation, equation_of
+from limb_nodes.levels.equation import Law, equation
 
 
 @equation("2.5", "bound_probability")
@@ -98,19 +98,16 @@ derenyi_vicsek = register(
     Law(
         "sarcomere",
         "derenyi_vicsek",
-        tuple(
-            equation_of(function)
-            for function in (
-                bound_probability,
-                maximum_sarcomere_force,
-                saturated_velocity,
-                unhindered_michaelis_constant,
-                adp_inhibition_constant,
-                michaelis_constant,
-                maximum_sarcomere_velocity,
-                sarcomere_velocity_norm,
-                sarcomere_force,
-            )
+        (
+            bound_probability,
+            maximum_sarcomere_force,
+            saturated_velocity,
+            unhindered_michaelis_constant,
+            adp_inhibition_constant,
+            michaelis_constant,
+            maximum_sarcomere_velocity,
+            sarcomere_velocity_norm,
+            sarcomere_force,
         ),
         (
             Parameter(

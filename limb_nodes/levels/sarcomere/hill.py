@@ -6,7 +6,7 @@ v_max maximum_velocity.
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, equation, equation_of
+from limb_nodes.levels.equation import Law, equation
 
 
 @equation("P_0", "maximum_sarcomere_force")
@@ -39,7 +39,7 @@ hill = register(
     Law(
         "sarcomere",
         "hill",
-        (equation_of(maximum_sarcomere_force), equation_of(sarcomere_force)),
+        (maximum_sarcomere_force, sarcomere_force),
         (
             Parameter(
                 "maximum_force",

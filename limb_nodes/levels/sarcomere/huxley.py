@@ -12,7 +12,7 @@ import math
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
-from limb_nodes.levels.equation import Law, State, equation, equation_of
+from limb_nodes.levels.equation import Law, State, equation
 from limb_nodes.levels.sarcomere.bond_moments import loss_0, loss_1, loss_2
 
 # Bonds just made, as a share of all sites, that are always counted in: the mean length of no bonds
@@ -203,25 +203,22 @@ huxley = register(
     Law(
         "sarcomere",
         "huxley",
-        tuple(
-            equation_of(function)
-            for function in (
-                maximum_sarcomere_force,
-                isometric_mean,
-                isometric_variance,
-                isometric_moment_0,
-                isometric_moment_1,
-                initial_moment_0,
-                initial_moment_1,
-                initial_moment_2,
-                bond_velocity,
-                bond_mean,
-                bond_deviation,
-                bond_moment_0_rate,
-                bond_moment_1_rate,
-                bond_moment_2_rate,
-                sarcomere_force,
-            )
+        (
+            maximum_sarcomere_force,
+            isometric_mean,
+            isometric_variance,
+            isometric_moment_0,
+            isometric_moment_1,
+            initial_moment_0,
+            initial_moment_1,
+            initial_moment_2,
+            bond_velocity,
+            bond_mean,
+            bond_deviation,
+            bond_moment_0_rate,
+            bond_moment_1_rate,
+            bond_moment_2_rate,
+            sarcomere_force,
         ),
         (
             Parameter(
