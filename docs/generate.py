@@ -142,7 +142,7 @@ def process_table() -> str:
     """The processes, where each is chosen and what may be chosen."""
     rows = []
     for contract in CONTRACTS.values():
-        place = "motor unit" if contract.level == "unit" and contract.process != "recruitment" else "muscle"
+        place = contract.section.replace("_", " ")
         laws = ", ".join(f"[`{name}`](laws.md#{anchor(contract.process, name)})" for name in REGISTRY[contract.process])
         absent = contract.absent or contract.default
         rows.append((f"`{contract.process}`", place, contract.meaning, laws, f"`{absent}`"))

@@ -195,7 +195,7 @@ def steady_state(chosen: ChosenLaw, probe: Probe, point: dict[str, float]) -> di
 def sarcomere_forces(use: Use, velocities: FloatArray) -> FloatArray:
     """Steady force (N) of a sarcomere at its optimal length by shortening velocity (m/s)."""
     best = unit_lengths(use.unit)["optimal_sarcomere_length"]
-    probe = Probe(use.chosen, [name for name in given(use.chosen) if not name.endswith("mum_sarcomere_length")], {})
+    probe = Probe(use.chosen, given(use.chosen), {})
     point = {"sarcomere_length": best, "sarcomere_frequency": use.unit.values["maximum_frequency"]}
     return np.array(
         [
@@ -426,10 +426,9 @@ def greatest_force(muscle: Muscle) -> float:
     total = 0.0
     for unit in muscle.units:
         chosen = unit.laws["sarcomere"]
-        names = [name for name in given(chosen) if not name.endswith("mum_sarcomere_length")]
         best = unit_lengths(unit)["optimal_sarcomere_length"]
         point = {"sarcomere_velocity": 0.0, "sarcomere_length": best, "sarcomere_frequency": 0.0}
-        probe = Probe(chosen, names, {})
+        probe = Probe(chosen, given(chosen), {})
         found = probe.at(**point, **initial_states(chosen, probe))
         total += unit.values["parallel_sarcomeres"] * found["maximum_sarcomere_force"]
     return total

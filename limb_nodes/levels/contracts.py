@@ -9,10 +9,11 @@ A law of a process
 3. declares each of its parameters with unit, allowed range and source;
 4. is written in plain scalar Python: arithmetic, comparisons, `if`, `abs`, `min`, `max`, the
    functions of `math`, and other functions of the same kind; no loops, containers or side
-   effects. Such code runs interpreted, compiled and differentiated alike;
+   effects. Such code runs interpreted, compiled and differentiated alike. An equation of parameters
+   alone may be any Python that returns a number: it runs once, interpreted, when a limb is loaded;
 5. may bring states; it then defines the rate of each;
 6. keeps the properties under `properties`, which are checked when a limb is loaded, over the law's
-   `ranges` where it declares them; a law with states has finite rates there.
+   `ranges` if it declares them; a law with states has finite rates there.
 """
 
 from __future__ import annotations
@@ -28,11 +29,14 @@ from limb_nodes.levels.equation import Equation, Law, ScalarFunction, State
 class Contract:
     """The interface of one process.
 
-    level: "unit" or "muscle", where the process belongs.
-    default: the law of a section that names none; absent: the law where the section is missing.
+    owner: "motor_unit" or "muscle", of which each has a law of this process.
+    level: the level of the report that holds the equations: "sarcomere", "motor_unit", "muscle", or its sub-level
+        "tendon". A law of the last two is chosen in a muscle's section of a limb's file.
+    default: the law of a section that names none. absent: the law if there is no section.
     """
 
     process: str
+    owner: str
     level: str
     meaning: str
     given: tuple[str, ...]
@@ -41,13 +45,19 @@ class Contract:
     properties: tuple[str, ...] = ()
     absent: str = ""
 
+    @property
+    def section(self) -> str:
+        """The section of a limb's file that chooses the law: "motor_unit" or "muscle"."""
+        return "muscle" if self.level in ("muscle", "tendon") else "motor_unit"
+
 
 CONTRACTS: dict[str, Contract] = {
     contract.process: contract
     for contract in (
         Contract(
             "sarcomere",
-            "unit",
+            "motor_unit",
+            "sarcomere",
             "force of one sarcomere",
             (
                 "sarcomere_length",
@@ -63,7 +73,8 @@ CONTRACTS: dict[str, Contract] = {
         ),
         Contract(
             "force_length",
-            "unit",
+            "motor_unit",
+            "motor_unit",
             "factor of active force by fibre length",
             (
                 "fibre_length_norm",
@@ -78,7 +89,8 @@ CONTRACTS: dict[str, Contract] = {
         ),
         Contract(
             "force_frequency",
-            "unit",
+            "motor_unit",
+            "motor_unit",
             "factor of active force by stimulation frequency",
             (
                 "frequency_norm",
@@ -95,7 +107,8 @@ CONTRACTS: dict[str, Contract] = {
         ),
         Contract(
             "passive_force",
-            "unit",
+            "motor_unit",
+            "motor_unit",
             "factor of passive force by fibre length",
             ("fibre_length_norm",),
             ("passive_force_factor",),
@@ -104,7 +117,8 @@ CONTRACTS: dict[str, Contract] = {
         ),
         Contract(
             "recruitment",
-            "unit",
+            "motor_unit",
+            "muscle",
             "stimulation frequency of a unit by activation",
             (
                 "activation",
@@ -118,16 +132,8 @@ CONTRACTS: dict[str, Contract] = {
             ("zero at zero activation", "rises with the activation"),
         ),
         Contract(
-            "activation_dynamics",
-            "muscle",
-            "activation of the muscle by excitation",
-            ("excitation",),
-            ("activation",),
-            "none",
-            ("rises with the excitation and is not negative, where the law has no states",),
-        ),
-        Contract(
             "path",
+            "muscle",
             "muscle",
             "muscle-tendon length, velocity and moment arm by joint angle",
             ("joint_angle", "joint_velocity", "role"),
@@ -138,6 +144,7 @@ CONTRACTS: dict[str, Contract] = {
         Contract(
             "tendon",
             "muscle",
+            "tendon",
             "length and lengthening velocity of the tendon by its force",
             ("tendon_force", "tendon_length"),
             ("tendon_velocity",),
@@ -147,6 +154,7 @@ CONTRACTS: dict[str, Contract] = {
         ),
         Contract(
             "aponeurosis",
+            "muscle",
             "muscle",
             "fibre geometry between muscle line and aponeurosis",
             ("muscle_length", "muscle_velocity", "total_fibre_force"),
@@ -160,14 +168,27 @@ CONTRACTS: dict[str, Contract] = {
             ("muscle force and fibre velocity rise with the force of the fibres", "the muscle force is not negative"),
             absent="none",
         ),
+        Contract(
+            "activation_dynamics",
+            "muscle",
+            "muscle",
+            "activation of the muscle by excitation",
+            ("excitation",),
+            ("activation",),
+            "none",
+            ("rises with the excitation and is not negative, where the law has no states",),
+        ),
     )
 }
+
+UNIT_PROCESSES = tuple(name for name, contract in CONTRACTS.items() if contract.owner == "motor_unit")
+MUSCLE_PROCESSES = tuple(name for name, contract in CONTRACTS.items() if contract.owner == "muscle")
 
 REGISTRY: dict[str, dict[str, Law]] = {process: {} for process in CONTRACTS}
 
 
 def register(new: Law) -> Law:
-    """Make a law selectable by its name; returns the law."""
+    """Let limbs choose a law by its name; returns the law."""
     REGISTRY[new.process][new.name] = new
     return new
 
@@ -181,20 +202,17 @@ def law(
     """Make a law of one equation from a function.
 
     The function's arguments are variables that the contract of `process` gives, or `parameters`;
-    its value is the variable that the contract asks for. Raises TypeError where the contract asks
-    for more than one variable: such a law is built with `Law`.
+    its value is the variable that the contract asks for. Raises TypeError if the contract asks for
+    more than one variable: such a law is built with `Law`.
     """
     contract = CONTRACTS[process]
     if len(contract.defines) != 1:
-        wanted = ", ".join(contract.defines)
-        raise TypeError(f"a law of {process} defines {wanted}: build it with Law(...)")
+        raise TypeError(f"a law of {process} defines {', '.join(contract.defines)}: build it with Law(...)")
 
-    def make(function: ScalarFunction) -> Law:
-        number = function.__name__
+    def build(function: ScalarFunction) -> Law:
         marked = function.__dict__.get("equation")
-        if isinstance(marked, Equation):
-            number = marked.number
-        made = Equation(number, contract.defines[0], function)
-        return Law(process, function.__name__, (made,), parameters, states, source)
+        number = marked.number if isinstance(marked, Equation) else function.__name__
+        item = Equation(number, contract.defines[0], function)
+        return Law(process, function.__name__, (item,), parameters, states, source)
 
-    return make
+    return build

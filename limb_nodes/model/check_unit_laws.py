@@ -41,8 +41,7 @@ def sarcomere_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
     """Falls with the velocity, with equal value and slope on both sides of zero velocity."""
     variable, name = "sarcomere_velocity", "sarcomere_force"
     fixed = lengths(context)
-    names = [n for n in given(chosen) if n not in fixed]
-    probe = Probe(chosen, names, {})
+    probe = Probe(chosen, given(chosen), {})
     fastest = FASTEST * fixed["optimal_sarcomere_length"]
     low, high = chosen.law.ranges.get(variable, (-fastest, fastest))
     velocities = grid(low, high)

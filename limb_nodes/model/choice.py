@@ -2,35 +2,40 @@
 
 from __future__ import annotations
 
-from limb_nodes.foundation.parameter import Parameter
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from limb_nodes.foundation.section import Section, one_line
 from limb_nodes.levels import CONTRACTS, REGISTRY, Law
 from limb_nodes.model.chosen import ChosenLaw
+from limb_nodes.model.system import all_parameters
 from limb_nodes.model.user_code import import_user_module, user_folders
 
 
-def choose_law(section: Section, key: str, process: str, shared: tuple[Parameter, ...] = ()) -> ChosenLaw:
-    """Read the law of a process under `key` of a section.
+def choose_law(section: Section, process: str, named: Mapping[str, Section] = MappingProxyType({})) -> ChosenLaw:
+    """Read the law of a process from the key of its name. Raises UserError.
 
-    The value is a mapping with `law` and the law's parameters, or only the law's name.
-    `shared` are parameters that every law of the process has.
+    The value is a mapping with `law` and the law's parameters, the law's name alone, or, for a
+    sarcomere, the name of one of the mappings in `named`.
     """
     contract = CONTRACTS[process]
-    if not section.has(key):
-        section.take(key)
-        chosen = Section(section.file, section.at(key), {"law": contract.absent or contract.default})
-    elif isinstance(section.content[key], str):
-        chosen = Section(section.file, section.at(key), {"law": section.take(key)})
+    value = section.take(process)
+    if value is None:
+        chosen = Section(section.file, section.at(process), {"law": contract.absent or contract.default})
+    elif isinstance(value, str):
+        chosen = Section(section.file, section.at(process), {"law": value})
+        if process == "sarcomere" and value in named:
+            chosen = Section(section.file, named[value].place, named[value].content)
     else:
-        chosen = section.section(key)
-    return read_law(chosen, process, shared)
+        chosen = section.section(process)
+    return read_law(chosen, process)
 
 
-def read_law(section: Section, process: str, shared: tuple[Parameter, ...] = ()) -> ChosenLaw:
+def read_law(section: Section, process: str) -> ChosenLaw:
     """Read law and parameters from a section that holds nothing else."""
     law, module = find_law(section, process)
     values: dict[str, float] = {}
-    parameters = (*shared, *law.parameters)
+    parameters = all_parameters(law)
     for parameter in parameters:
         value = section.number(parameter)
         if value is not None:
@@ -43,7 +48,7 @@ def read_law(section: Section, process: str, shared: tuple[Parameter, ...] = ())
 
 
 def find_law(section: Section, process: str) -> tuple[Law, str]:
-    """The law that `section.law` names, and the user's module it is in; UserError where there is none."""
+    """The law that `section.law` names, and the user's module that it is in. Raises UserError."""
     known = REGISTRY[process]
     name = section.text("law", CONTRACTS[process].default)
     if name in known:
@@ -59,10 +64,10 @@ def find_law(section: Section, process: str) -> tuple[Law, str]:
         module = import_user_module(module_name, user_folders(section.file))
     except Exception as problem:
         section.fail("law", f"is {name!r}; it cannot be imported: {one_line(problem) or type(problem).__name__}")
-    found = getattr(module, attribute, None)
-    if not isinstance(found, Law):
+    law = getattr(module, attribute, None)
+    if not isinstance(law, Law):
         section.fail("law", f"is {name!r}; {attribute} in {module_name} is no law")
-    elif found.process != process:
-        section.fail("law", f"is {name!r}, a law of {found.process}; a law of {process} is needed")
-    assert isinstance(found, Law)
-    return found, module_name
+    elif law.process != process:
+        section.fail("law", f"is {name!r}, a law of {law.process}; a law of {process} is needed")
+    assert isinstance(law, Law)
+    return law, module_name

@@ -9,9 +9,6 @@ from functools import cached_property
 from limb_nodes.levels import Law
 from limb_nodes.model.system import BoundEquation, System, muscle_system, unit_system
 
-UNIT_PROCESSES = ("sarcomere", "force_length", "force_frequency", "passive_force", "recruitment")
-MUSCLE_PROCESSES = ("path", "tendon", "aponeurosis", "activation_dynamics")
-
 
 @dataclass(frozen=True)
 class UnitKind:

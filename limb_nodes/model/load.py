@@ -13,11 +13,11 @@ from typing import Any
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.foundation.section import Section, parse_yaml, read_yaml, yaml_text
-from limb_nodes.levels import motor_unit, sarcomere
+from limb_nodes.levels import CONTRACTS, MUSCLE_PROCESSES, UNIT_PROCESSES, motor_unit
 from limb_nodes.levels.motor_unit.recruitment import unit_thresholds
 from limb_nodes.model.check import check_geometry, check_unit
 from limb_nodes.model.check_law import check_laws
-from limb_nodes.model.choice import choose_law, read_law
+from limb_nodes.model.choice import choose_law
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
 
@@ -73,7 +73,6 @@ ACTIVATION_THRESHOLD = Parameter(
 COUNT = Parameter("count", "1", "number of such units", 1.0, "depends on the muscle", 1.0, 10000.0, integer=True)
 ORDER = Parameter("order", "1", "place in the recruitment order, R_F", 0.0, "position in the list")
 ROLES = {"flexor": 1.0, "extensor": -1.0}
-UNIT_LAWS = ("force_length", "force_frequency", "passive_force")
 
 
 def load_limb(path: str | Path) -> Limb:
@@ -130,21 +129,21 @@ def build_limb(content: Any, file: str, text: str) -> Limb:
     top = Section(file, "", content)
     segments = tuple(read_segment(section) for section in top.sections("segments", required=True))
     joints = [segment.joint for segment in segments]
-    refuse_twins(top, "segments", "joint", joints)
-    refuse_twins(top, "segments", "name", [segment.name for segment in segments])
+    refuse_duplicates(top, "segments", "joint", joints)
+    refuse_duplicates(top, "segments", "name", [segment.name for segment in segments])
     sarcomeres = read_named(top, "sarcomeres")
     kinds = read_named(top, "unit_kinds")
     muscles = tuple(
         read_muscle(section, joints, sarcomeres, kinds) for section in top.sections("muscles", required=False)
     )
-    refuse_twins(top, "muscles", "name", [muscle.name for muscle in muscles])
+    refuse_duplicates(top, "muscles", "name", [muscle.name for muscle in muscles])
     limb = Limb(
         name=top.text("name"),
         gravity=pair(top.vector("gravity", 2, (0.0, -9.81))),
-        base_angle=needed(top.number(BASE_ANGLE)),
+        base_angle=present(top.number(BASE_ANGLE)),
         base_position=pair(top.vector("base_position", 2, (0.0, 0.0))),
         tip_force=pair(top.vector("tip_force", 2, (0.0, 0.0))),
-        tip_torque=needed(top.number(TIP_TORQUE)),
+        tip_torque=present(top.number(TIP_TORQUE)),
         segments=segments,
         muscles=muscles,
         file=file,
@@ -160,7 +159,7 @@ def build_limb(content: Any, file: str, text: str) -> Limb:
 
 def read_segment(section: Section) -> Segment:
     """One entry of `segments`."""
-    values = {parameter.name: needed(section.number(parameter)) for parameter in SEGMENT_PARAMETERS}
+    values = {parameter.name: present(section.number(parameter)) for parameter in SEGMENT_PARAMETERS}
     joint_range = None
     if section.has("range"):
         joint_range = pair(section.vector("range", 2, None))
@@ -186,20 +185,17 @@ def read_muscle(
     name = section.text("name")
     joint = section.choice("joint", joints)
     role = ROLES[section.choice("role", ROLES)]
-    threshold = needed(section.number(ACTIVATION_THRESHOLD))
-    laws = {
-        process: choose_law(section, process, process)
-        for process in ("path", "tendon", "aponeurosis", "activation_dynamics")
-    }
-    recruitment = choose_law(section, "recruitment", "recruitment")
+    threshold = present(section.number(ACTIVATION_THRESHOLD))
+    laws = {process: choose_law(section, process) for process in MUSCLE_PROCESSES}
+    of_units = {name: choose_law(section, name) for name in UNIT_PROCESSES if CONTRACTS[name].section == "muscle"}
     units: list[tuple[float, MotorUnit]] = []
     for position, unit_section in enumerate(section.sections("units", required=True)):
         names = {unit.name for _, unit in units}
-        found = read_units(unit_section, position, sarcomeres, kinds, recruitment)
-        for _, unit in found:
+        new = read_units(unit_section, position, sarcomeres, kinds, of_units)
+        for _, unit in new:
             if unit.name in names:
                 section.fail(f"units[{position}].name", f"is {unit.name!r} a second time; names are unique")
-        units += found
+        units += new
     units.sort(key=lambda entry: entry[0])
     ordered = [unit for _, unit in units]
     section.finish()
@@ -222,9 +218,12 @@ def read_units(
     position: int,
     sarcomeres: dict[str, Section],
     kinds: dict[str, Section],
-    recruitment: ChosenLaw,
+    given: dict[str, ChosenLaw],
 ) -> list[tuple[float, MotorUnit]]:
-    """One entry of `units`: `count` units with their place in the recruitment order."""
+    """One entry of `units`: `count` units with their place in the recruitment order.
+
+    given: laws of the units that the muscle's section chooses.
+    """
     if section.has("kind"):
         kind = kinds[section.choice("kind", kinds)]
         content = {**kind.content, **section.content}
@@ -234,19 +233,17 @@ def read_units(
         section = Section(section.file, section.place, content, inherited)
     section.take("kind")
     name = section.text("name", section.content.get("kind") or f"unit{position + 1}")
-    count = int(needed(section.number(COUNT)))
-    order = needed(section.number(ORDER)) if section.has("order") else float(position)
+    count = int(present(section.number(COUNT)))
+    order = present(section.number(ORDER)) if section.has("order") else float(position)
     section.take("order")
-    values = {parameter.name: needed(section.number(parameter)) for parameter in motor_unit.PARAMETERS}
+    values = {parameter.name: present(section.number(parameter)) for parameter in motor_unit.PARAMETERS}
     if values["maximum_frequency"] <= values["minimum_frequency"]:
         section.fail(
             "maximum_frequency",
             f"is {values['maximum_frequency']:g}; a number > minimum_frequency "
             f"({values['minimum_frequency']:g}) in Hz is needed",
         )
-    laws = {process: choose_law(section, process, process) for process in UNIT_LAWS}
-    laws["sarcomere"] = read_sarcomere(section, sarcomeres)
-    laws["recruitment"] = recruitment
+    laws = {name: given[name] if name in given else choose_law(section, name, sarcomeres) for name in UNIT_PROCESSES}
     section.finish()
     check_unit(section, values, laws)
     return [
@@ -258,17 +255,6 @@ def read_units(
     ]
 
 
-def read_sarcomere(section: Section, sarcomeres: dict[str, Section]) -> ChosenLaw:
-    """The sarcomere of a unit: a name under `sarcomeres`, a law's name, or a mapping."""
-    named = section.content.get("sarcomere")
-    if isinstance(named, str) and named in sarcomeres:
-        section.take("sarcomere")
-        kind = sarcomeres[named]
-        fresh = Section(kind.file, kind.place, kind.content)
-        return read_law(fresh, "sarcomere", sarcomere.PARAMETERS)
-    return choose_law(section, "sarcomere", "sarcomere", sarcomere.PARAMETERS)
-
-
 def read_named(top: Section, key: str) -> dict[str, Section]:
     """A mapping of names to mappings, which may be missing."""
     if not top.has(key):
@@ -278,7 +264,7 @@ def read_named(top: Section, key: str) -> dict[str, Section]:
     return {name: holder.section(name) for name in holder.content}
 
 
-def refuse_twins(section: Section, key: str, field: str, names: list[str]) -> None:
+def refuse_duplicates(section: Section, key: str, field: str, names: list[str]) -> None:
     """Refuse a list in which two entries have the same name."""
     for index, name in enumerate(names):
         if name in names[:index]:
@@ -290,7 +276,7 @@ def pair(values: tuple[float, ...]) -> tuple[float, float]:
     return (values[0], values[1])
 
 
-def needed(value: float | None) -> float:
-    """A number that `Section.number` has found or has a numeric default for."""
+def present(value: float | None) -> float:
+    """A number that is in the file or has a numeric default."""
     assert value is not None
     return value

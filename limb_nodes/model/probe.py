@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Real
 
-from limb_nodes.levels import CONTRACTS, Equation, sarcomere
+from limb_nodes.levels import CONTRACTS, Equation
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.curve_checks import number
+from limb_nodes.model.system import all_equations
 
 
 class BrokenLaw(Exception):
@@ -34,11 +36,9 @@ class Probe:
 
     def __init__(self, chosen: ChosenLaw, given: Iterable[str], constants: Mapping[str, float]) -> None:
         own = {f":{name}": value for name, value in chosen.values.items()}
-        equations = chosen.law.equations
-        if chosen.law.process == "sarcomere":
-            equations = (*sarcomere.EQUATIONS, *equations)
         waiting = [
-            Step(item, tuple(f":{name}" if f":{name}" in own else name for name in item.uses)) for item in equations
+            Step(item, tuple(f":{name}" if f":{name}" in own else name for name in item.uses))
+            for item in all_equations(chosen.law)
         ]
         self.start: dict[str, float] = {**constants, **own}
         self.steps: list[Step] = []
@@ -50,7 +50,7 @@ class Probe:
                 raise BrokenLaw(missing(waiting, known))
             for step in ready:
                 if varying.isdisjoint(step.symbols):
-                    self.start[step.equation.defines] = evaluate(step, self.start)
+                    self.start[step.equation.defines] = value_of(step, self.start)
                 else:
                     self.steps.append(step)
                     varying.add(step.equation.defines)
@@ -66,11 +66,11 @@ class Probe:
         """All variables at a point."""
         values = {**self.start, **point}
         for step in self.steps:
-            values[step.equation.defines] = evaluate(step, values)
+            values[step.equation.defines] = value_of(step, values)
         return values
 
 
-def evaluate(step: Step, values: Mapping[str, float]) -> float:
+def value_of(step: Step, values: Mapping[str, float]) -> float:
     """The value of an equation; NaN where its arithmetic fails, as when it is compiled."""
     try:
         value = step.equation.function(*[values[symbol] for symbol in step.symbols])
@@ -83,7 +83,7 @@ def evaluate(step: Step, values: Mapping[str, float]) -> float:
     # A negative number to a broken power is complex in Python and NaN in compiled code.
     if isinstance(value, complex):
         return math.nan
-    if not isinstance(value, int | float):
+    if not isinstance(value, Real):
         raise BrokenLaw(f"equation {step.equation.number} returns {value!r}, not a number")
     return float(value)
 
@@ -99,8 +99,10 @@ def missing(waiting: list[Step], known: set[str]) -> str:
 
 
 def given(chosen: ChosenLaw) -> list[str]:
-    """The variables that a law of its process is given, and its states."""
-    return [*CONTRACTS[chosen.law.process].given, *(state.name for state in chosen.law.states)]
+    """The variables that a law of its process is given from outside, and its states."""
+    computed = {item.defines for item in all_equations(chosen.law)}
+    variables = [name for name in CONTRACTS[chosen.law.process].given if name not in computed]
+    return [*variables, *(state.name for state in chosen.law.states)]
 
 
 def initial_states(chosen: ChosenLaw, probe: Probe) -> dict[str, float]:

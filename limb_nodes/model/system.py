@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels import Equation, Law, State, motor_unit, muscle, sarcomere
 
 UNIT_PARAMETERS = (
@@ -16,8 +17,11 @@ UNIT_PARAMETERS = (
     "unit_threshold",
     "unit_rank",
 )
+MUSCLE_PARAMETERS = ("role",)
 UNIT_INPUTS = ("activation", "fibre_length", "fibre_velocity")
 MUSCLE_INPUTS = ("excitation", "joint_angle", "joint_velocity", "total_fibre_force")
+# What laws are given and no movement changes.
+CONSTANTS = frozenset({*UNIT_PARAMETERS, *MUSCLE_PARAMETERS, *(item.defines for item in sarcomere.EQUATIONS)})
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,8 @@ class BoundEquation:
 class System:
     """The equations of a motor unit or of a muscle around its units.
 
-    parameters: symbols of the given numbers; inputs: variables defined by another level.
-    states: variables that are integrated, each with its law.
+    parameters: symbols of the given numbers. inputs: variables that another level defines.
+    states: variables that are integrated, each with the process of its law.
     """
 
     equations: tuple[BoundEquation, ...]
@@ -47,7 +51,8 @@ class System:
     inputs: tuple[str, ...]
     states: tuple[tuple[State, str], ...]
 
-    def __post_init__(self) -> None:
+    def checked(self) -> System:
+        """This system. Raises ValueError for a variable that is defined twice or not at all."""
         defined = set(self.inputs) | set(self.parameters) | {state.name for state, _ in self.states}
         for bound in self.equations:
             if bound.defines in defined:
@@ -62,6 +67,7 @@ class System:
         for state, process in self.states:
             if state.rate not in defined:
                 raise ValueError(f"{process}: nothing defines {state.rate}")
+        return self
 
     def dependence(self) -> dict[str, frozenset[str]]:
         """For every variable the inputs and states on which it depends, through any chain."""
@@ -90,35 +96,47 @@ class System:
         return order
 
 
+def all_parameters(law: Law) -> tuple[Parameter, ...]:
+    """The parameters that are known inside a law only: those of its process, and its own."""
+    return (*(sarcomere.PARAMETERS if law.process == "sarcomere" else ()), *law.parameters)
+
+
+def all_equations(law: Law) -> tuple[Equation, ...]:
+    """The equations that a law brings along: those that its process has whatever the law, and its own."""
+    return (*(sarcomere.EQUATIONS if law.process == "sarcomere" else ()), *law.equations)
+
+
 def unit_system(laws: Mapping[str, Law]) -> System:
-    """The equations of a motor unit with the laws of its processes."""
-    shared = {"sarcomere": tuple(parameter.name for parameter in sarcomere.PARAMETERS)}
-    return assemble((*motor_unit.EQUATIONS,), UNIT_PARAMETERS, UNIT_INPUTS, laws, shared, sarcomere.EQUATIONS)
+    """The equations of a motor unit with the laws of its processes. Raises ValueError as `System.checked`."""
+    return unit_equations(laws).checked()
 
 
 def muscle_system(laws: Mapping[str, Law]) -> System:
-    """The equations of a muscle around its units, `total_fibre_force` taken as given."""
-    return assemble(muscle.EQUATIONS, ("role",), MUSCLE_INPUTS, laws, {}, ())
+    """The equations of a muscle around its units, `total_fibre_force` taken as given. Raises ValueError likewise."""
+    return muscle_equations(laws).checked()
+
+
+def unit_equations(laws: Mapping[str, Law]) -> System:
+    """The equations of a motor unit, whether they can be solved or not."""
+    return assemble(motor_unit.EQUATIONS, UNIT_PARAMETERS, UNIT_INPUTS, laws)
+
+
+def muscle_equations(laws: Mapping[str, Law]) -> System:
+    """The equations of a muscle around its units, whether they can be solved or not."""
+    return assemble(muscle.EQUATIONS, MUSCLE_PARAMETERS, MUSCLE_INPUTS, laws)
 
 
 def assemble(
-    level: Iterable[Equation],
-    parameters: tuple[str, ...],
-    inputs: tuple[str, ...],
-    laws: Mapping[str, Law],
-    shared: Mapping[str, tuple[str, ...]],
-    sarcomere_equations: Iterable[Equation],
+    level: Iterable[Equation], parameters: Iterable[str], inputs: tuple[str, ...], laws: Mapping[str, Law]
 ) -> System:
     """Bind the equations of a level and of its laws."""
     bound = [BoundEquation(item, item.uses, "") for item in level]
     symbols = list(parameters)
     states = []
     for process, law in laws.items():
-        own = (*shared.get(process, ()), *(parameter.name for parameter in law.parameters))
-        symbols += [f"{process}__{name}" for name in own]
-        equations = (*sarcomere_equations, *law.equations) if process in shared else law.equations
-        for item in equations:
-            names = tuple(f"{process}__{name}" if name in own else name for name in item.uses)
-            bound.append(BoundEquation(item, names, process))
+        own = {parameter.name: f"{process}__{parameter.name}" for parameter in all_parameters(law)}
+        symbols += own.values()
+        for item in all_equations(law):
+            bound.append(BoundEquation(item, tuple(own.get(name, name) for name in item.uses), process))
         states += [(state, process) for state in law.states]
     return System(tuple(bound), tuple(symbols), inputs, tuple(states))

@@ -15,10 +15,9 @@ from limb_nodes.analysis.structure.muscles import muscle_assembly
 from limb_nodes.analysis.structure.table import matrix_lines, report
 from limb_nodes.commands import structure
 from limb_nodes.errors import UserError
-from limb_nodes.levels import CONTRACTS, REGISTRY, Law, State, equation, equation_of
+from limb_nodes.levels import CONTRACTS, MUSCLE_PROCESSES, REGISTRY, UNIT_PROCESSES, Law, State, equation
 from limb_nodes.levels.muscle.tendon import INITIAL_LENGTH, LENGTH_STATE, SLACK_LENGTH
 from limb_nodes.model import ChosenLaw, load_limb
-from limb_nodes.model.layout import MUSCLE_PROCESSES, UNIT_PROCESSES
 from limb_nodes.model.system import muscle_system, unit_system
 
 ROOT = Path(__file__).parents[2]
@@ -219,8 +218,8 @@ def test_states_of_a_law_appear_in_its_level():
     def maximum() -> float:
         return 1.0
 
-    equations = tuple(equation_of(f) for f in (relaxed_rate, force, maximum))
-    law = Law("sarcomere", "relaxing", equations, states=(State("relaxed", "relaxed_rate", "relaxing", "x", 1.0),))
+    functions = (relaxed_rate, force, maximum)
+    law = Law("sarcomere", "relaxing", functions, states=(State("relaxed", "relaxed_rate", "relaxing", "x", 1.0),))
     limb = with_law(limb_of("reference_joint_tendon"), "sarcomere", law, {})
     sarcomere = level_of(limb, "sarcomere")
     assert sarcomere.kind == "differential and algebraic equations"
@@ -235,7 +234,7 @@ def spring_force(tendon_length: float, slack_length: float) -> float:
     return slack_length - tendon_length
 
 
-SPRING = Law("tendon", "spring", (equation_of(spring_force),), (SLACK_LENGTH, INITIAL_LENGTH), (LENGTH_STATE,), "test")
+SPRING = Law("tendon", "spring", (spring_force,), (SLACK_LENGTH, INITIAL_LENGTH), (LENGTH_STATE,), "test")
 
 
 @equation("constant velocity", "tendon_velocity")
@@ -269,7 +268,7 @@ def test_a_law_that_defines_a_variable_twice_is_named():
     twice = Law(
         "tendon",
         "twice",
-        (*REGISTRY["tendon"]["voigt"].equations, equation_of(constant_velocity)),
+        (*REGISTRY["tendon"]["voigt"].equations, constant_velocity),
         REGISTRY["tendon"]["voigt"].parameters,
         (LENGTH_STATE,),
         "test",
@@ -289,9 +288,7 @@ def test_a_law_that_defines_a_variable_twice_is_named():
 
 
 def test_a_length_that_is_fixed_and_a_state_has_index_two():
-    fixed = Law(
-        "tendon", "fixed", (equation_of(fixed_length),), (SLACK_LENGTH, INITIAL_LENGTH), (LENGTH_STATE,), "test"
-    )
+    fixed = Law("tendon", "fixed", (fixed_length,), (SLACK_LENGTH, INITIAL_LENGTH), (LENGTH_STATE,), "test")
     tendon = level_of(with_law(limb_of("reference_joint_tendon"), "tendon", fixed, {}), "tendon")
     assert tendon.degrees_of_freedom == 0
     assert tendon.index == 2

@@ -105,14 +105,14 @@ NUMBERS = {
 
 def system_around(law):
     """The system of a unit or muscle that has this law and, for the rest, the defaults."""
-    level = CONTRACTS[law.process].level
+    owner = CONTRACTS[law.process].owner
     laws = {
         process: REGISTRY[process][contract.absent or contract.default]
         for process, contract in CONTRACTS.items()
-        if contract.level == level
+        if contract.owner == owner
     }
     laws[law.process] = law
-    return (unit_system if level == "unit" else muscle_system)(laws), laws
+    return (unit_system if owner == "motor_unit" else muscle_system)(laws), laws
 
 
 def parameters_of(laws) -> dict[str, float]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from limb_nodes.analysis.structure import chain, muscles
 from limb_nodes.analysis.structure.muscles import APONEUROSIS, MUSCLE, SARCOMERE, TENDON, UNIT, unit_owner
 from limb_nodes.analysis.structure.relations import Assembly, EquationSet
-from limb_nodes.levels import Law
+from limb_nodes.levels import CONTRACTS, MUSCLE_PROCESSES, UNIT_PROCESSES, Law
 from limb_nodes.model import Limb, Muscle
 
 ASSEMBLED, MODEL = "muscle_assembled", "model"
@@ -23,8 +23,7 @@ TITLES = {
     MODEL: "whole model",
 }
 MUSCLE_LEVELS = (SARCOMERE, UNIT, MUSCLE, TENDON, APONEUROSIS)
-UNIT_LAWS = ("force_length", "force_frequency", "passive_force")
-MUSCLE_LAWS = ("path", "aponeurosis", "activation_dynamics")
+MUSCLE_LAWS = tuple(process for process in MUSCLE_PROCESSES if CONTRACTS[process].level == MUSCLE)
 
 
 def equation_sets(limb: Limb, level: str | None = None) -> list[EquationSet]:
@@ -52,7 +51,8 @@ def equation_sets(limb: Limb, level: str | None = None) -> list[EquationSet]:
 
 def sets_of_units(limb: Limb, assembly: Assembly) -> Iterator[EquationSet]:
     """Sarcomeres and motor units, one set for each choice of laws."""
-    for level, processes in ((SARCOMERE, ("sarcomere",)), (UNIT, UNIT_LAWS)):
+    for level in (SARCOMERE, UNIT):
+        processes = [process for process in UNIT_PROCESSES if CONTRACTS[process].level == level]
         alike: dict[tuple[Law, ...], list[str]] = {}
         for muscle in limb.muscles:
             for unit in muscle.units:
