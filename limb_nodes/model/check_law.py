@@ -10,7 +10,7 @@ import math
 from functools import lru_cache
 
 from limb_nodes.errors import UserError
-from limb_nodes.levels import CONTRACTS
+from limb_nodes.levels import CONTRACTS, Equation
 from limb_nodes.levels.sarcomere.lengths import optimal_sarcomere_length
 from limb_nodes.levels.tangent import UnsupportedCode, refuse_unsupported
 from limb_nodes.model.check_muscle_laws import MUSCLE_CHECKS
@@ -18,7 +18,9 @@ from limb_nodes.model.check_unit_laws import UNIT_CHECKS
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
 from limb_nodes.model.probe import BrokenLaw
+from limb_nodes.model.system import CONSTANTS
 
+# By process.
 CHECKS = {**UNIT_CHECKS, **MUSCLE_CHECKS}
 
 
@@ -35,10 +37,10 @@ def check_laws(limb: Limb) -> None:
 
 def check_law(file: str, chosen: ChosenLaw, context: dict[str, float]) -> None:
     """Refuse a law. context: numbers of its muscle or unit that matter to its check."""
-    found = fault(Same(chosen), tuple(context.items()))
-    if found:
+    wrong = fault(Same(chosen), tuple(context.items()))
+    if wrong:
         name = f"{chosen.module}:{chosen.law.name}" if chosen.module else chosen.law.name
-        raise UserError(f"{file}: {chosen.place}.law is {name!r}: {found}")
+        raise UserError(f"{file}: {chosen.place}.law is {name!r}: {wrong}")
 
 
 def unit_context(unit: MotorUnit) -> dict[str, float]:
@@ -87,9 +89,9 @@ def fault(same: Same, context: tuple[tuple[str, float], ...]) -> str:
     chosen = same.chosen
     # Laws that come with the package fit their contracts.
     if chosen.module:
-        found = interface_fault(chosen)
-        if found:
-            return found
+        wrong = interface_fault(chosen)
+        if wrong:
+            return wrong
     try:
         return CHECKS[chosen.law.process](chosen, dict(context))
     except BrokenLaw as problem:
@@ -115,9 +117,27 @@ def interface_fault(chosen: ChosenLaw) -> str:
             return f"it does not define {state.rate}, the rate of its state {state.name}"
         if state.initial not in allowed:
             return f"it does not define {state.initial}, the initial value of its state {state.name}"
-    for item in law.equations:
+    for item in changing_equations(chosen):
         try:
             refuse_unsupported(item.function)
         except UnsupportedCode as problem:
             return f"it cannot be compiled: {problem}"
     return ""
+
+
+def changing_equations(chosen: ChosenLaw) -> list[Equation]:
+    """The equations whose values a movement can change: those that use a variable, through any chain.
+
+    They are compiled; the others, of parameters alone, run once, interpreted.
+    """
+    law = chosen.law
+    variables = {*CONTRACTS[law.process].given, *(state.name for state in law.states)} - CONSTANTS
+    waiting = list(law.equations)
+    changing: list[Equation] = []
+    while True:
+        new = [item for item in waiting if variables.intersection(item.uses) - chosen.values.keys()]
+        if not new:
+            return changing
+        variables.update(item.defines for item in new)
+        waiting = [item for item in waiting if item not in new]
+        changing += new

@@ -12,6 +12,7 @@ from limb_nodes.levels.sarcomere import PARAMETERS as FILAMENTS
 from limb_nodes.model import ChosenLaw, load_limb, with_values
 from limb_nodes.model.check_law import Same, fault
 from limb_nodes.model.curve_checks import kink_fault
+from limb_nodes.model.probe import Probe, given
 
 LIMB = (Path(__file__).parents[2] / "params" / "reference_joint_tendon.yaml").read_text(encoding="utf-8")
 
@@ -161,6 +162,62 @@ def downward(excitation): return 1.0 - excitation
 inverted = Law("activation_dynamics", "inverted", (Equation("a", "activation", downward),))
 """
 
+ANY_PYTHON = """
+import math
+import numpy as np
+from limb_nodes.levels import Law, Parameter, equation
+
+class Bell:
+    def __init__(self, width):
+        self.width = width
+
+    def __call__(self, length):
+        return math.exp(-((length - 1.0) / self.width) ** 2)
+
+WIDTH = Parameter("width", "1", "width", 0.5, above=0.0)
+
+@equation("grid", "mean")
+def mean(width):
+    lengths = np.linspace(0.0, 2.0, 201)
+    return np.mean([Bell(width)(length) for length in lengths])
+
+@equation("mean square", "square")
+def square(mean, optimal_sarcomere_length):
+    total = 0
+    for part in {"a": mean, "b": mean}.values():
+        total += 0.5 * part ** 2
+    return np.float32(total) if optimal_sarcomere_length > 0.0 else None
+
+@equation("bell", "force_length_factor")
+def factor(fibre_length_norm, square, width):
+    return square * math.exp(-(((fibre_length_norm - 1.0) / width) ** 2))
+
+@equation("mean of a length", "mean")
+def mean_of_length(width, fibre_length_norm):
+    lengths = np.linspace(0.0, 2.0, 201)
+    return np.mean([Bell(width)(length) for length in lengths])
+
+@equation("mean square of a length", "square")
+def looping_square(mean, optimal_sarcomere_length):
+    total = 0
+    for part in {"a": mean, "b": mean}.values():
+        total += 0.5 * part ** 2
+    return total
+
+@equation("mean of a length", "mean")
+def scalar_mean_of_length(width, fibre_length_norm):
+    return width * fibre_length_norm
+
+@equation("no number", "mean")
+def text(width):
+    return str(width)
+
+free = Law("force_length", "free", (mean, square, factor), (WIDTH,))
+direct = Law("force_length", "direct", (mean_of_length, square, factor), (WIDTH,))
+chained = Law("force_length", "chained", (scalar_mean_of_length, looping_square, factor), (WIDTH,))
+worded = Law("force_length", "worded", (text, square, factor), (WIDTH,))
+"""
+
 KIND = "unit_kinds.slow"
 PSOAS = "sarcomeres.psoas"
 
@@ -169,7 +226,12 @@ PSOAS = "sarcomeres.psoas"
 def limb(tmp_path_factory):
     folder = tmp_path_factory.mktemp("laws")
     (folder / "limb.yaml").write_text(LIMB, encoding="utf-8")
-    for name, text in (("unit_laws", UNIT_LAWS), ("sarcomeres_", SARCOMERES), ("muscle_laws", MUSCLE_LAWS)):
+    for name, text in (
+        ("unit_laws", UNIT_LAWS),
+        ("sarcomeres_", SARCOMERES),
+        ("muscle_laws", MUSCLE_LAWS),
+        ("any_python", ANY_PYTHON),
+    ):
         (folder / f"{name}.py").write_text(text, encoding="utf-8")
     return load_limb(folder / "limb.yaml")
 
@@ -267,6 +329,29 @@ def test_recruitment_law_is_refused(limb):
 )
 def test_law_is_accepted(limb, place, law):
     with_values(limb, {place: {"law": law}})
+
+
+def test_an_equation_of_parameters_alone_may_be_any_python(limb):
+    law = (
+        with_values(limb, {f"{KIND}.force_length": {"law": "any_python:free"}}).muscles[0].units[0].laws["force_length"]
+    )
+    probe = Probe(law, given(law), {"optimal_sarcomere_length": 2.7e-6})
+    grid = [math.exp(-(((0.01 * i - 1.0) / 0.5) ** 2)) for i in range(201)]
+    assert probe.start["mean"] == pytest.approx(sum(grid) / 201, rel=1e-12)
+    assert probe.at(fibre_length_norm=1.0)["force_length_factor"] == pytest.approx(probe.start["mean"] ** 2, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        # The same code in an equation that uses a variable, at once or through another equation.
+        ("direct", "it cannot be compiled: mean_of_length, line 34: np.mean is not allowed; functions of math are"),
+        ("chained", "it cannot be compiled: looping_square, line 39: For is not allowed in a law"),
+        ("worded", "equation no number returns '0.5', not a number"),
+    ],
+)
+def test_an_equation_that_uses_a_variable_may_not(limb, law, words):
+    assert words in said(limb, f"{KIND}.force_length", f"any_python:{law}")
 
 
 @pytest.mark.parametrize("bend", [-1e-2, 1e-2, 0.5])

@@ -284,6 +284,9 @@ def test_a_law_of_ones_own_beside_the_limb(tmp_path):
         "raise_later = 3\n"
     )
     (tmp_path / "broken_law.py").write_text("x = 1/0\n")
+    (tmp_path / "unmarked_law.py").write_text(
+        "from limb_nodes.levels import Law\ndef velocity(): return 0.0\nsoft = Law('tendon', 'soft', (velocity,))\n"
+    )
     file = tmp_path / "limb.yaml"
     file.write_text(
         BASE.replace("{law: voigt, stiffness: 1.0e+5, slack_length: 0.03}", "{law: 'my_tendon:soft', rest: 0.03}")
@@ -291,6 +294,9 @@ def test_a_law_of_ones_own_beside_the_limb(tmp_path):
     assert load_limb(file).muscles[0].laws["tendon"].values == {"rest": 0.03}
     file.write_text(BASE.replace("law: voigt", "law: 'broken_law:soft'"))
     with pytest.raises(UserError, match="cannot be imported: division by zero"):
+        load_limb(file)
+    file.write_text(BASE.replace("law: voigt", "law: 'unmarked_law:soft'"))
+    with pytest.raises(UserError, match="cannot be imported: velocity is not marked; @equation is needed"):
         load_limb(file)
 
 

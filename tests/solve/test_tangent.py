@@ -8,7 +8,9 @@ import pytest
 
 from limb_nodes.levels import CONTRACTS, REGISTRY, motor_unit, muscle, sarcomere
 from limb_nodes.levels.tangent import UnsupportedCode, tangent_source
+from limb_nodes.model import load_limb, with_values
 from limb_nodes.model.system import muscle_system, unit_system
+from limb_nodes.solve.whole import WholeModel
 
 PARAMS = Path(__file__).parents[2] / "params"
 LAWS = [law for process in REGISTRY.values() for law in process.values()]
@@ -298,3 +300,33 @@ def gamma(x):
 def test_code_outside_the_subset_is_refused_by_name(function):
     with pytest.raises(UnsupportedCode, match=function.__name__):
         Tangents()(function, {"x": 0.5}, {"x": 1.0})
+
+
+LOADED = """
+import numpy as np
+from limb_nodes.levels import Law, Parameter, equation
+
+@equation("table", "slack")
+def slack(tenths):
+    return float(np.sum([0.1 for _ in range(int(tenths))]))
+
+@equation("parabola", "passive_force_factor")
+def parabola(fibre_length_norm, slack):
+    stretch = max(0.0, fibre_length_norm - slack)
+    return (stretch / (2.0 - slack)) ** 2
+
+tabulated = Law("passive_force", "tabulated", (slack, parabola), (Parameter("tenths", "1", "tenths", 8.0),))
+"""
+
+
+def test_an_equation_of_parameters_alone_is_not_compiled(tmp_path):
+    """It may use what compiled code may not; its law then moves the limb as one that has the number itself."""
+    (tmp_path / "loaded.py").write_text(LOADED, encoding="utf-8")
+    (tmp_path / "limb.yaml").write_text((PARAMS / "reference_joint.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    limb = load_limb(tmp_path / "limb.yaml")
+    ends = []
+    for law in ({"law": "loaded:tabulated"}, {"law": "quadratic", "slack_length": 0.8}, {"law": "quadratic"}):
+        changed = with_values(limb, {"unit_kinds.slow.passive_force": law})
+        ends.append(WholeModel(changed).simulate(np.full((11, 2), 0.5), 100.0).angle[-1, 0])
+    assert ends[0] == pytest.approx(ends[1], rel=1e-12)
+    assert ends[2] != pytest.approx(ends[1], rel=1e-6)

@@ -9,6 +9,7 @@ g_2 release, g_3 overstretch, h reach. Half a sarcomere shortens at half its vel
 """
 
 import math
+from functools import lru_cache
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.contracts import register
@@ -18,7 +19,11 @@ from limb_nodes.levels.sarcomere.bond_moments import loss_0, loss_1, loss_2
 # Bonds just made, as a share of all sites, that are always counted in: the mean length of no bonds
 # at all would be 0/0. Just made, they have the moments 1, 2/3 and 1/2 of f.
 FRESH = 1e-8
-STEPS = 15.0
+# Of Newton's method, to the steady state in isometry.
+STEPS = 15
+
+# f_1, g_1, g_2, g_3 (1/s).
+Rates = tuple[float, float, float, float]
 
 
 @equation("P_0", "maximum_sarcomere_force")
@@ -94,63 +99,52 @@ def bond_moment_2_rate(
     return attachment / 4.0 - bond_moment_0 * lost - 2.0 * bond_velocity * bond_moment_1
 
 
-def misfit_1(mean: float, variance: float, f1: float, g1: float, g2: float, g3: float) -> float:
-    """Zero where a distribution keeps its mean in isometry: F_1/F_0 = b_1/b_0."""
+def misfits(mean: float, variance: float, rates: Rates) -> tuple[float, float]:
+    """Both are zero if a distribution stays as it is in isometry: F_1/F_0 = b_1/b_0 and F_2/F_0 = b_2/b_0."""
     deviation = math.sqrt(variance)
-    return loss_1(mean, deviation, f1, g1, g2, g3) - loss_0(mean, deviation, f1, g1, g2, g3) * 2.0 / 3.0
-
-
-def misfit_2(mean: float, variance: float, f1: float, g1: float, g2: float, g3: float) -> float:
-    """Zero where a distribution keeps its second moment in isometry: F_2/F_0 = b_2/b_0."""
-    deviation = math.sqrt(variance)
-    return loss_2(mean, deviation, f1, g1, g2, g3) - loss_0(mean, deviation, f1, g1, g2, g3) * 0.5
-
-
-def newton_part(wanted: float, mean: float, variance: float, f1: float, g1: float, g2: float, g3: float) -> float:
-    """Newton's step of the mean (`wanted` 0) or of the variance (1) towards the steady state."""
-    d = 1e-5
-    one = misfit_1(mean, variance, f1, g1, g2, g3)
-    two = misfit_2(mean, variance, f1, g1, g2, g3)
-    one_mean = (misfit_1(mean + d, variance, f1, g1, g2, g3) - misfit_1(mean - d, variance, f1, g1, g2, g3)) / (2.0 * d)
-    two_mean = (misfit_2(mean + d, variance, f1, g1, g2, g3) - misfit_2(mean - d, variance, f1, g1, g2, g3)) / (2.0 * d)
-    one_var = (misfit_1(mean, variance + d, f1, g1, g2, g3) - misfit_1(mean, variance - d, f1, g1, g2, g3)) / (2.0 * d)
-    two_var = (misfit_2(mean, variance + d, f1, g1, g2, g3) - misfit_2(mean, variance - d, f1, g1, g2, g3)) / (2.0 * d)
-    determinant = one_mean * two_var - one_var * two_mean
-    if wanted < 0.5:
-        return (one_var * two - two_var * one) / determinant
-    return (two_mean * one - one_mean * two) / determinant
-
-
-def settled(
-    wanted: float, steps: float, mean: float, variance: float, f1: float, g1: float, g2: float, g3: float
-) -> float:
-    """Mean (`wanted` 0) or variance (1) of the isometric bonds, `steps` of Newton from a guess."""
-    if steps < 0.5:
-        return mean if wanted < 0.5 else variance
-    mean_step = newton_part(0.0, mean, variance, f1, g1, g2, g3)
-    variance_step = newton_part(1.0, mean, variance, f1, g1, g2, g3)
-    return settled(
-        wanted,
-        steps - 1.0,
-        min(0.95, max(0.05, mean + mean_step)),
-        min(0.5, max(0.01, variance + variance_step)),
-        f1,
-        g1,
-        g2,
-        g3,
+    lost = loss_0(mean, deviation, *rates)
+    return (
+        loss_1(mean, deviation, *rates) - lost * 2.0 / 3.0,
+        loss_2(mean, deviation, *rates) - lost * 0.5,
     )
+
+
+def newton_step(mean: float, variance: float, rates: Rates) -> tuple[float, float]:
+    """Newton's step of mean and variance (1) towards the steady state in isometry."""
+    d = 1e-5
+    one, two = misfits(mean, variance, rates)
+    by_mean = zip(misfits(mean + d, variance, rates), misfits(mean - d, variance, rates), strict=True)
+    by_variance = zip(misfits(mean, variance + d, rates), misfits(mean, variance - d, rates), strict=True)
+    one_mean, two_mean = ((after - before) / (2.0 * d) for after, before in by_mean)
+    one_variance, two_variance = ((after - before) / (2.0 * d) for after, before in by_variance)
+    determinant = one_mean * two_variance - one_variance * two_mean
+    return (
+        (one_variance * two - two_variance * one) / determinant,
+        (two_mean * one - one_mean * two) / determinant,
+    )
+
+
+@lru_cache
+def isometric_bonds(rates: Rates) -> tuple[float, float]:
+    """Mean and variance (1) of the bonds' length in isometry, from those of Huxley's exact distribution on."""
+    mean, variance = 0.5, 1.0 / 12.0
+    for _ in range(STEPS):
+        mean_step, variance_step = newton_step(mean, variance, rates)
+        mean = min(0.95, max(0.05, mean + mean_step))
+        variance = min(0.5, max(0.01, variance + variance_step))
+    return mean, variance
 
 
 @equation("p, isometric", "isometric_mean")
 def isometric_mean(attachment: float, detachment: float, release: float, overstretch: float) -> float:
-    """Mean length (1) of the bonds in isometry, from the exact 1/2 of Huxley's distribution on."""
-    return settled(0.0, STEPS, 0.5, 1.0 / 12.0, attachment, detachment, release, overstretch)
+    """Mean length (1) of the bonds in isometry."""
+    return isometric_bonds((attachment, detachment, release, overstretch))[0]
 
 
 @equation("q^2, isometric", "isometric_variance")
 def isometric_variance(attachment: float, detachment: float, release: float, overstretch: float) -> float:
     """Variance (1) of the bonds' length in isometry."""
-    return settled(1.0, STEPS, 0.5, 1.0 / 12.0, attachment, detachment, release, overstretch)
+    return isometric_bonds((attachment, detachment, release, overstretch))[1]
 
 
 @equation("Q_0, isometric", "isometric_moment_0")
