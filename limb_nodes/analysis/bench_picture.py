@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from limb_nodes.analysis.style import COLOURS, new_figure, save, styled
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.solve.bench import BenchRecord
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Colour-blind safe (Okabe and Ito).
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 # More motor units than this are drawn as one band from the lowest to the highest.
 MOST_LINES = 7
 
 
-def draw(record: BenchRecord, title: str, path: Path) -> None:
-    """Draw force, lengths, pennation and frequencies over time; the kind of file follows from the name."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+@styled
+def draw_bench(record: BenchRecord, title: str, path: Path) -> None:
+    """Draw force, lengths, pennation and frequencies over time into a file. Raises UserError."""
     muscle = record.muscle
     lengths = [("muscle-tendon", record.muscle_tendon_length), ("fibres", record.fibre_length)]
     if muscle["tendon_length"].any():
@@ -36,30 +32,27 @@ def draw(record: BenchRecord, title: str, path: Path) -> None:
         drive.append(("activation", muscle["activation"]))
     pennate = bool(record.pennation_angle.any())
     count = 5 if pennate else 4
-    figure = Figure(figsize=(8.0, 1.9 * count + 0.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, x=0.012, ha="left", fontsize=12, weight="bold")
+    figure = new_figure(8.0, 1.9 * count + 0.6, title)
     panels = list(figure.subplots(count, 1, sharex=True))
-    lines(panels[0], record.time, drive, "activation (1)")
+    draw_lines(panels[0], record.time, drive, "activation (1)")
     panels[0].set_ylim(-0.05, 1.05)
-    frequencies(panels[1], record)
-    lines(panels[2], record.time, [("force", record.force)], "force (N)")
+    draw_frequencies(panels[1], record)
+    draw_lines(panels[2], record.time, [("force", record.force)], "force (N)")
     panels[2].set_ylim(bottom=min(0.0, float(record.force.min())))
-    lines(panels[3], record.time, [(name, 1e3 * values) for name, values in lengths], "length (mm)")
+    draw_lines(panels[3], record.time, [(name, 1e3 * values) for name, values in lengths], "length (mm)")
     if pennate:
-        angle = [("pennation", math.degrees(1.0) * record.pennation_angle)]
-        lines(panels[4], record.time, angle, "pennation (deg)")
+        draw_lines(panels[4], record.time, [("pennation", np.degrees(record.pennation_angle))], "pennation (deg)")
     panels[-1].set_xlabel("time (s)")
     panels[-1].set_xlim(record.time[0], record.time[-1])
     figure.align_ylabels(panels)
-    figure.savefig(path, dpi=130)
+    save(figure, path)
 
 
-def lines(axes: Axes, time: FloatArray, series: list[tuple[str, FloatArray]], label: str) -> None:
-    """Some series in one panel, named where there are several."""
+def draw_lines(axes: Axes, time: FloatArray, series: list[tuple[str, FloatArray]], label: str) -> None:
+    """Some series in one panel, named if there are several."""
     for (name, values), colour in zip(series, COLOURS, strict=False):
-        axes.plot(time, values, color=colour, lw=1.4, label=name)
-    dress(axes, label, len(series) > 1)
+        axes.plot(time, values, color=colour, label=name)
+    finish(axes, label, len(series) > 1)
     middle = float(np.mean([values.mean() for _, values in series]))
     spread = max(float(values.max()) for _, values in series) - min(float(values.min()) for _, values in series)
     if spread < 1e-9 * max(abs(middle), 1.0):
@@ -68,7 +61,7 @@ def lines(axes: Axes, time: FloatArray, series: list[tuple[str, FloatArray]], la
         axes.set_ylim(middle - half, middle + half)
 
 
-def frequencies(axes: Axes, record: BenchRecord) -> None:
+def draw_frequencies(axes: Axes, record: BenchRecord) -> None:
     """Stimulation frequencies of the motor units."""
     if len(record.unit_names) <= MOST_LINES:
         # Units of the same frequency share a line, which would hide all but the last of them.
@@ -77,22 +70,20 @@ def frequencies(axes: Axes, record: BenchRecord) -> None:
             shared.setdefault(record.frequency[:, index].tobytes(), []).append(index)
         for indices, colour in zip(shared.values(), COLOURS, strict=False):
             name = ", ".join(record.unit_names[index] for index in indices)
-            axes.plot(record.time, record.frequency[:, indices[0]], color=colour, lw=1.4, label=name)
-        dress(axes, "frequency (Hz)", len(record.unit_names) > 1)
+            axes.plot(record.time, record.frequency[:, indices[0]], color=colour, label=name)
+        finish(axes, "frequency (Hz)", len(record.unit_names) > 1)
     else:
         low, high = record.frequency.min(axis=1), record.frequency.max(axis=1)
         axes.fill_between(record.time, low, high, color=COLOURS[0], alpha=0.3, lw=0, label="lowest to highest")
         mean = record.frequency.mean(axis=1)
-        axes.plot(record.time, mean, color=COLOURS[0], lw=1.4, label=f"mean of {len(record.unit_names)} units")
-        dress(axes, "frequency (Hz)", True)
+        axes.plot(record.time, mean, color=COLOURS[0], label=f"mean of {len(record.unit_names)} units")
+        finish(axes, "frequency (Hz)", True)
     axes.set_ylim(bottom=0.0)
 
 
-def dress(axes: Axes, label: str, legend: bool) -> None:
-    """Label, grid and frame of a panel."""
+def finish(axes: Axes, label: str, legend: bool) -> None:
+    """Label and legend of a panel."""
     axes.set_ylabel(label)
-    axes.grid(color="#dddddd", lw=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
     axes.ticklabel_format(axis="y", useOffset=False)
     if legend:
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=9)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

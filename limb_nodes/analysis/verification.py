@@ -1,7 +1,7 @@
 """The verification of the report's section 3.3 as data: limbs, what drives them, and what they must show.
 
 The expected numbers never come from the solvers that are verified: the period of a pendulum is an elliptic integral,
-equilibria balance torques, a pendulum turns where its energy says, and the other courses are solved by scipy with
+equilibria balance torques, a pendulum turns where its energy says, and the other movements are solved by scipy with
 equations that the test of this module writes down again.
 """
 
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from limb_nodes.analysis.course import Course, course_of_movement
+from limb_nodes.analysis.trajectory import Trajectory, trajectory_of_movement
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import load_limb
@@ -40,13 +40,13 @@ JOINT, TENDON = "reference_joint.yaml", "reference_joint_tendon.yaml"
 class Quantity:
     """A number that a case must show.
 
-    name: with its unit. tolerance: greatest distance of found from expected. find: it in a course.
+    name: with its unit. tolerance: greatest distance of found from expected. find: it in a trajectory.
     """
 
     name: str
     expected: float
     tolerance: float
-    find: Callable[[Course], float]
+    find: Callable[[Trajectory], float]
 
 
 @dataclass(frozen=True)
@@ -114,16 +114,16 @@ class Finding:
         }
 
 
-def solve_whole(case: Case, limb: Limb) -> Course:
+def solve_whole(case: Case, limb: Limb) -> Trajectory:
     """Run a case by the whole-model solve. Raises SolveError."""
     movement = WholeModel(limb).simulate(case.drive(limb), RATE)
-    return course_of_movement(limb, movement)
+    return trajectory_of_movement(limb, movement)
 
 
-def examine(case: Case, solver: str, course: Course | None) -> list[Finding]:
-    """Find every quantity of a case; none where there is no course."""
+def examine(case: Case, solver: str, trajectory: Trajectory | None) -> list[Finding]:
+    """Find every quantity of a case; none where there is no trajectory."""
     return [
-        Finding(case, quantity, solver, float("nan") if course is None else quantity.find(course))
+        Finding(case, quantity, solver, float("nan") if trajectory is None else quantity.find(trajectory))
         for quantity in case.quantities
     ]
 
@@ -139,107 +139,107 @@ def crossings(time: FloatArray, signal: FloatArray, rising: bool | None = None) 
     return time[k] + share * (time[k + 1] - time[k]), k
 
 
-def frequency(course: Course) -> float:
+def frequency(trajectory: Trajectory) -> float:
     """Frequency (Hz) of the joint angle about its mean, over whole periods."""
-    angle = course.angle[:, 0]
-    times, _ = crossings(course.time, angle - angle.mean(), rising=True)
+    angle = trajectory.angle[:, 0]
+    times, _ = crossings(trajectory.time, angle - angle.mean(), rising=True)
     return (len(times) - 1) / float(times[-1] - times[0]) if len(times) > 1 else float("nan")
 
 
-def turning_angles(course: Course) -> FloatArray:
+def turning_angles(trajectory: Trajectory) -> FloatArray:
     """Joint angles (rad) at which the velocity changes its sign."""
-    times, k = crossings(course.time, course.velocity[:, 0])
+    times, k = crossings(trajectory.time, trajectory.velocity[:, 0])
     # From a sample to the turn the velocity goes straight to zero.
-    turns: FloatArray = course.angle[k, 0] + 0.5 * course.velocity[k, 0] * (times - course.time[k])
+    turns: FloatArray = trajectory.angle[k, 0] + 0.5 * trajectory.velocity[k, 0] * (times - trajectory.time[k])
     return turns
 
 
-def lowest_turn(course: Course) -> float:
+def lowest_turn(trajectory: Trajectory) -> float:
     """Lowest angle (rad) at which the joint turns."""
-    return float(turning_angles(course).min(initial=np.inf))
+    return float(turning_angles(trajectory).min(initial=np.inf))
 
 
-def highest_turn(course: Course) -> float:
+def highest_turn(trajectory: Trajectory) -> float:
     """Highest angle (rad) at which the joint turns."""
-    return float(turning_angles(course).max(initial=-np.inf))
+    return float(turning_angles(trajectory).max(initial=-np.inf))
 
 
-def balanced_angle(course: Course) -> float:
+def balanced_angle(trajectory: Trajectory) -> float:
     """Angle (rad) at which the swinging joint is not accelerated, the mean over all passages."""
-    times, k = crossings(course.time, course.acceleration[:, 0])
+    times, k = crossings(trajectory.time, trajectory.acceleration[:, 0])
     if not len(times):
         return float("nan")
-    return float(np.mean(course.angle[k, 0] + course.velocity[k, 0] * (times - course.time[k])))
+    return float(np.mean(trajectory.angle[k, 0] + trajectory.velocity[k, 0] * (times - trajectory.time[k])))
 
 
-def last_angle(course: Course) -> float:
+def last_angle(trajectory: Trajectory) -> float:
     """Joint angle (rad) at the end."""
-    return float(course.angle[-1, 0])
+    return float(trajectory.angle[-1, 0])
 
 
-def last_velocity(course: Course) -> float:
+def last_velocity(trajectory: Trajectory) -> float:
     """Joint velocity (rad/s) at the end."""
-    return float(course.velocity[-1, 0])
+    return float(trajectory.velocity[-1, 0])
 
 
-def last_torque(course: Course) -> float:
+def last_torque(trajectory: Trajectory) -> float:
     """Torque of all muscles on the joint (N m) at the end."""
-    return float(course.torque[-1, 0])
+    return float(trajectory.torque[-1, 0])
 
 
-def tendon_length(muscle: int, instant: int) -> Callable[[Course], float]:
+def tendon_length(muscle: int, instant: int) -> Callable[[Trajectory], float]:
     """Finds the tendon length (m) of a muscle at an instant."""
-    return lambda course: float(course.muscle["tendon_length"][instant, muscle])
+    return lambda trajectory: float(trajectory.muscle["tendon_length"][instant, muscle])
 
 
-def slowing_share(direction: float) -> Callable[[Course], float]:
+def slowing_share(direction: float) -> Callable[[Trajectory], float]:
     """Finds the share of instants at which the joint does not speed up in a direction."""
-    return lambda course: float(np.mean(direction * np.diff(course.velocity[:, 0]) <= 0.0))
+    return lambda trajectory: float(np.mean(direction * np.diff(trajectory.velocity[:, 0]) <= 0.0))
 
 
-def arrival(limit: float) -> Callable[[Course], float]:
+def arrival(limit: float) -> Callable[[Trajectory], float]:
     """Finds the time (s) of the first instant at which the joint is at a limit."""
 
-    def find(course: Course) -> float:
-        there = np.abs(course.angle[:, 0] - limit) < 1e-9
-        return float(course.time[int(there.argmax())]) if there.any() else float("nan")
+    def find(trajectory: Trajectory) -> float:
+        there = np.abs(trajectory.angle[:, 0] - limit) < 1e-9
+        return float(trajectory.time[int(there.argmax())]) if there.any() else float("nan")
 
     return find
 
 
-def straying(limit: float) -> Callable[[Course], float]:
+def straying(limit: float) -> Callable[[Trajectory], float]:
     """Finds how far (rad) the joint leaves a limit again, or passes it."""
 
-    def find(course: Course) -> float:
-        away = np.abs(course.angle[:, 0] - limit)
+    def find(trajectory: Trajectory) -> float:
+        away = np.abs(trajectory.angle[:, 0] - limit)
         there = away < 1e-9
         return float(away[int(there.argmax()) :].max()) if there.any() else float("nan")
 
     return find
 
 
-def wrongly_firing(course: Course) -> float:
+def wrongly_firing(trajectory: Trajectory) -> float:
     """Instants at which a motor unit fires below the threshold or is silent at or above it."""
-    return float(np.sum((course.unit["stimulation_frequency"] > 0.0) != (course.activation >= 0.8)))
+    return float(np.sum((trajectory.unit["stimulation_frequency"] > 0.0) != (trajectory.activation >= 0.8)))
 
 
-def firing_share(muscle: int) -> Callable[[Course], float]:
+def firing_share(muscle: int) -> Callable[[Trajectory], float]:
     """Finds the share of the time in which the unit of a muscle fires; the last instant begins another period."""
-    return lambda course: float(np.mean(course.unit["stimulation_frequency"][:-1, muscle] > 0.0))
+    return lambda trajectory: float(np.mean(trajectory.unit["stimulation_frequency"][:-1, muscle] > 0.0))
 
 
-def lowest_firing(course: Course) -> float:
+def lowest_firing(trajectory: Trajectory) -> float:
     """Lowest frequency (Hz) at which a motor unit fires."""
-    rates = course.unit["stimulation_frequency"]
+    rates = trajectory.unit["stimulation_frequency"]
     return float(rates[rates > 0.0].min(initial=np.inf))
 
 
-def highest_firing(course: Course) -> float:
+def highest_firing(trajectory: Trajectory) -> float:
     """Highest frequency (Hz) at which a motor unit fires."""
-    return float(course.unit["stimulation_frequency"].max())
+    return float(trajectory.unit["stimulation_frequency"].max())
 
 
-def near(name: str, expected: float, find: Callable[[Course], float], tolerance: float = EQUILIBRIUM) -> Quantity:
+def near(name: str, expected: float, find: Callable[[Trajectory], float], tolerance: float = EQUILIBRIUM) -> Quantity:
     """A quantity with an absolute tolerance."""
     return Quantity(name, expected, tolerance, find)
 

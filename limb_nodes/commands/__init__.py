@@ -9,12 +9,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from limb_nodes.analysis.style import SUFFIXES
 from limb_nodes.errors import FieldError
 
-PICTURES = (".png", ".pdf", ".svg")
 
-
-def output_file(field: str, name: str, endings: tuple[str, ...] = PICTURES) -> Path:
+def output_file(field: str, name: str, endings: tuple[str, ...] = SUFFIXES) -> Path:
     """The path of a file to write. Raises FieldError if its ending is another, or its folder is not there."""
     path = Path(name)
     if path.suffix.lower() not in endings:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 
 from limb_nodes.analysis.curves import characteristics
-from limb_nodes.commands import PICTURES, output_file, writing
+from limb_nodes.analysis.style import SUFFIXES
+from limb_nodes.commands import output_file, writing
 from limb_nodes.errors import UserError
 from limb_nodes.model import load_limb
 
@@ -19,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "frequency, passive force, recruitment, activation, tendons, paths, moment arms and pennation.",
     )
     parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
-    parser.add_argument("-o", "--out", required=True, metavar="FILE.png", help=f"the picture; {', '.join(PICTURES)}")
+    parser.add_argument("-o", "--out", required=True, metavar="FILE.png", help=f"the picture; {', '.join(SUFFIXES)}")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -28,12 +29,12 @@ def run(args: argparse.Namespace) -> int:
     limb = load_limb(args.limb)
     if not limb.muscles:
         raise UserError(f"{args.limb}: muscles is empty; at least one is needed, for only muscles have characteristics")
-    panels = characteristics(limb)
-    from limb_nodes.analysis.draw_curves import draw
+    from limb_nodes.analysis.curves.picture import draw_characteristics
 
+    diagrams = characteristics(limb)
     with writing("out"):
-        draw(panels, limb.name, out)
-    for panel in panels:
-        print(f"{panel.title}: {', '.join(panel.laws)}")
+        draw_characteristics(diagrams, limb.name, out)
+    for diagram in diagrams:
+        print(f"{diagram.title}: {', '.join(diagram.laws)}")
     print(f"picture: {out}")
     return 0

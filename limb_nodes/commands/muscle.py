@@ -7,7 +7,8 @@ import json
 import math
 from typing import TYPE_CHECKING
 
-from limb_nodes.commands import PICTURES, output_file, writing
+from limb_nodes.analysis.style import SUFFIXES
+from limb_nodes.commands import output_file, writing
 from limb_nodes.errors import FieldError
 from limb_nodes.foundation.parameter import Parameter
 
@@ -72,7 +73,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="held at the first length before, without activation (rest, default) or with the first activation "
         "(steady); or the states of the limb's file",
     )
-    parser.add_argument("-o", "--out", metavar="FILE.png", help=f"draw it; {', '.join(PICTURES)}")
+    parser.add_argument("-o", "--out", metavar="FILE.png", help=f"draw it; {', '.join(SUFFIXES)}")
     parser.add_argument("--csv", metavar="FILE.csv", help="write every output at every time")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON, in SI units")
 
@@ -104,10 +105,10 @@ def run(args: argparse.Namespace) -> int:
     from limb_nodes.analysis.bench_table import plain, text, write_csv
 
     if picture:
-        from limb_nodes.analysis.bench_picture import draw
+        from limb_nodes.analysis.bench_picture import draw_bench
 
         with writing("out"):
-            draw(record, f"{args.muscle} of {limb.name} on the bench", picture)
+            draw_bench(record, f"{args.muscle} of {limb.name} on the bench", picture)
     if table:
         with writing("csv"):
             write_csv(record, table)

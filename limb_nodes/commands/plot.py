@@ -34,16 +34,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Draw, and print the path of the picture."""
-    from limb_nodes.analysis.plot.picture import LARGEST_DPI, picture, save
-    from limb_nodes.analysis.plot.series import read_run
+    from limb_nodes.analysis.plot.picture import LARGEST_DPI, picture
+    from limb_nodes.analysis.plot.series import read_series
+    from limb_nodes.analysis.style import save
 
     out = output_file("out", args.out)
     Parameter("dpi", "1", "dots per inch", minimum=10, maximum=LARGEST_DPI).check(args.dpi)
     if out.is_dir() or (out.exists() and not args.force):
         raise FieldError("out", f"is {out}, which exists already; a new name is needed, or --force")
-    shown = read_run(args.bag, namespace=args.namespace, start=args.start, end=args.end, reference=args.reference)
-    save(picture(shown), out, args.dpi)
-    for note in shown.notes:
+    series = read_series(args.bag, namespace=args.namespace, start=args.start, end=args.end, reference=args.reference)
+    save(picture(series), out, args.dpi)
+    for note in series.notes:
         print(f"note: {note}")
-    print(f"picture  {out} ({shown.start:g} to {shown.end:g} s)")
+    print(f"picture  {out} ({series.start:g} to {series.end:g} s)")
     return 0

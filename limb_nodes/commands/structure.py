@@ -10,7 +10,8 @@ import sys
 from limb_nodes.analysis.structure import TITLES, analyse
 from limb_nodes.analysis.structure.plain import plain
 from limb_nodes.analysis.structure.table import report
-from limb_nodes.commands import PICTURES, output_file, writing
+from limb_nodes.analysis.style import SUFFIXES
+from limb_nodes.commands import output_file, writing
 from limb_nodes.errors import FieldError
 from limb_nodes.model import load_limb
 
@@ -32,7 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
     parser.add_argument("--level", choices=list(TITLES), help="this level only, with its whole matrix")
     parser.add_argument("--json", action="store_true", help="print JSON; docs/structure.md lists its keys")
-    parser.add_argument("-o", "--out", metavar="FILE.png", help=f"draw the matrices; {', '.join(PICTURES)}")
+    parser.add_argument("-o", "--out", metavar="FILE.png", help=f"draw the matrices; {', '.join(SUFFIXES)}")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -43,10 +44,10 @@ def run(args: argparse.Namespace) -> int:
     if not findings:
         raise FieldError("level", f"is {args.level}; a level that a muscle of this limb has is needed", args.limb)
     if out:
-        from limb_nodes.analysis.structure.picture import draw
+        from limb_nodes.analysis.structure.picture import draw_structure
 
         with writing("out"):
-            draw(findings, limb.name, out)
+            draw_structure(findings, limb.name, out)
     if args.json:
         text = json.dumps(plain(findings, limb.name, args.limb), indent=1)
     else:

@@ -18,7 +18,7 @@ from limb_nodes.commands import writing
 from limb_nodes.errors import FieldError
 
 if TYPE_CHECKING:
-    from limb_nodes.analysis.course import Course
+    from limb_nodes.analysis.trajectory import Trajectory
     from limb_nodes.analysis.verification import Case, Finding
     from limb_nodes.model.limb import Limb
 
@@ -53,21 +53,21 @@ def run(args: argparse.Namespace) -> int:
     limbs = {case.name: case.build(folder) for case in cases}
     pictures = make_folder(args.figures) if args.figures else None
     ways = ("whole",) if args.whole else ("graph",) if args.graph else WAYS
-    courses: dict[str, dict[str, Course]] = {case.name: {} for case in cases}
+    trajectories: dict[str, dict[str, Trajectory]] = {case.name: {} for case in cases}
     findings: list[Finding] = []
     for way in ways:
         for case in cases:
-            course = run_case(case, limbs[case.name], way)
-            findings += examine(case, way, course)
-            if course is not None:
-                courses[case.name][way] = course
+            trajectory = run_case(case, limbs[case.name], way)
+            findings += examine(case, way, trajectory)
+            if trajectory is not None:
+                trajectories[case.name][way] = trajectory
     if pictures:
-        from limb_nodes.analysis.verification_figures import draw
+        from limb_nodes.analysis.verification_figures import draw_case
 
         for case in cases:
-            if courses[case.name]:
+            if trajectories[case.name]:
                 path = pictures / f"figure_{case.name.replace('.', '_').replace('-', '_')}.png"
-                draw(case, limbs[case.name].muscle_names, courses[case.name], path)
+                draw_case(case, limbs[case.name].muscle_names, trajectories[case.name], path)
     if args.json:
         print(json.dumps([finding.plain() for finding in findings], indent=1))
     else:
@@ -94,7 +94,7 @@ def make_folder(folder: str) -> Path:
     return path
 
 
-def run_case(case: Case, limb: Limb, way: str) -> Course | None:
+def run_case(case: Case, limb: Limb, way: str) -> Trajectory | None:
     """Run a case one way; None, and a line, if the equations cannot be solved."""
     from limb_nodes.analysis.verification import solve_whole
     from limb_nodes.solve.whole import SolveError
@@ -106,9 +106,9 @@ def run_case(case: Case, limb: Limb, way: str) -> Course | None:
         return None
 
 
-def solve_graph(case: Case, limb: Limb) -> Course:
+def solve_graph(case: Case, limb: Limb) -> Trajectory:
     """Run a case by the nodes, in one process, into a bag that lives as long as this takes."""
-    from limb_nodes.analysis.course import course_of_bag
+    from limb_nodes.analysis.trajectory import trajectory_of_bag
     from limb_nodes.analysis.verification import RATE
     from limb_nodes.nodes.session import Run, run_in_one_process
     from limb_nodes.solve.whole import SolveError
@@ -138,7 +138,7 @@ def solve_graph(case: Case, limb: Limb) -> Course:
             raise KeyboardInterrupt
         if outcome.missing or outcome.ticks != round(case.duration * RATE) + 1:
             raise SolveError(f"{outcome.ticks} ticks recorded, {outcome.missing} messages missing")
-        return course_of_bag(bag)
+        return trajectory_of_bag(bag)
 
 
 def write_limb(limb: Limb, path: Path) -> None:

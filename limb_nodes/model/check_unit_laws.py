@@ -5,11 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from limb_nodes.levels.motor_unit.fibre import fibre_length_norm, frequency_norm
-from limb_nodes.levels.sarcomere.lengths import (
-    maximum_sarcomere_length,
-    minimum_sarcomere_length,
-    optimal_sarcomere_length,
-)
+from limb_nodes.levels.sarcomere.lengths import sarcomere_lengths
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.curve_checks import POINTS, curve_fault, grid, kink_fault, number, place
 from limb_nodes.model.probe import Probe, given, states_fault
@@ -17,15 +13,6 @@ from limb_nodes.model.probe import Probe, given, states_fault
 # Greatest velocity at which a sarcomere law is checked, in its optimal lengths per second, about
 # what the fastest limb muscles reach.
 FASTEST = 10.0
-
-
-def lengths(context: dict[str, float]) -> dict[str, float]:
-    """Optimal, shortest and longest length (m) of the unit's sarcomeres."""
-    return {
-        "optimal_sarcomere_length": optimal_sarcomere_length(context["actin_length"]),
-        "minimum_sarcomere_length": minimum_sarcomere_length(context["myosin_length"]),
-        "maximum_sarcomere_length": maximum_sarcomere_length(context["myosin_length"], context["actin_length"]),
-    }
 
 
 def some_lengths(probe: Probe, fixed: dict[str, float]) -> Iterator[tuple[dict[str, float], str]]:
@@ -40,7 +27,7 @@ def some_lengths(probe: Probe, fixed: dict[str, float]) -> Iterator[tuple[dict[s
 def sarcomere_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
     """Falls with the velocity, with equal value and slope on both sides of zero velocity."""
     variable, name = "sarcomere_velocity", "sarcomere_force"
-    fixed = lengths(context)
+    fixed = sarcomere_lengths(context)
     probe = Probe(chosen, given(chosen), {})
     fastest = FASTEST * fixed["optimal_sarcomere_length"]
     low, high = chosen.law.ranges.get(variable, (-fastest, fastest))
@@ -85,7 +72,7 @@ def passive_force_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
 def by_length(chosen: ChosenLaw, context: dict[str, float], name: str, direction: int) -> str:
     """A factor over normalised fibre lengths from 0 to 2, or the declared range."""
     variable = "fibre_length_norm"
-    fixed = lengths(context)
+    fixed = sarcomere_lengths(context)
     least, best, most = (fixed[f"{end}_sarcomere_length"] for end in ("minimum", "optimal", "maximum"))
     probe = Probe(chosen, given(chosen), fixed)
     norms = grid(*chosen.law.ranges.get(variable, (0.0, 2.0)))
@@ -103,7 +90,7 @@ def force_frequency_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
     """Zero at zero frequency, rises from the lowest to the greatest frequency of the unit."""
     variable, name = "stimulation_frequency", "force_frequency_factor"
     low, high = context["minimum_frequency"], context["maximum_frequency"]
-    fixed = {**lengths(context), "minimum_frequency": low, "maximum_frequency": high}
+    fixed = {**sarcomere_lengths(context), "minimum_frequency": low, "maximum_frequency": high}
     probe = Probe(chosen, given(chosen), fixed)
     frequencies = [0.0, *grid(*chosen.law.ranges.get(variable, (low, high)), POINTS // 2)]
     inputs = [{variable: f, "frequency_norm": frequency_norm(f, low, high)} for f in frequencies]

@@ -16,8 +16,8 @@ import numpy as np
 
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.records import Record, copy_record, new_record, whole_numbers
-from limb_nodes.model.chain import chain_block
 from limb_nodes.levels import MUSCLE_PROCESSES, UNIT_PROCESSES
+from limb_nodes.model.chain import chain_block
 from limb_nodes.model.kinds import MuscleKind, UnitKind
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
 from limb_nodes.model.system import BoundEquation, System

@@ -39,7 +39,7 @@ def at(panel, x: float, curve: int = 0) -> float:
 )
 def test_force_velocity(reference, velocity, force):
     panel = reference["force_velocity"]
-    assert (panel.x_unit, panel.y_unit, panel.figure) == ("m/s", "N", "fig. 2.2")
+    assert (panel.x.unit, panel.y.unit, panel.figure) == ("m/s", "N", "fig. 2.2")
     assert at(panel, velocity * 2.29817e-6) / 9.7778e-13 == pytest.approx(force, abs=2e-3)
     assert panel.curves[0].x[-1] == pytest.approx(2.3e-6, rel=0.06)
 
@@ -49,7 +49,7 @@ def test_force_length_and_frequency(reference):
     # exp(-|1/1.12|^1.61) at the shortest length (2.22, slow).
     assert at(reference["force_length"], 0.0) == pytest.approx(math.exp(-((1 / 1.12) ** 1.61)))
     panel = reference["force_frequency"]
-    assert panel.x_unit == "Hz"
+    assert panel.x.unit == "Hz"
     assert [at(panel, f) for f in (5.0, 10.0, 15.0)] == pytest.approx([0.0, 0.5, 1.0], abs=1e-9)
     assert at(reference["passive_force"], 1.6) == pytest.approx((0.4 / 0.8) ** 2, abs=1e-3)
 

@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from limb_nodes.analysis.plot.limbs import instants, muscle_path, posture
 from limb_nodes.analysis.plot.panels import columns_of, look_of
 from limb_nodes.analysis.plot.picture import picture
-from limb_nodes.analysis.plot.series import Series, read_run
+from limb_nodes.analysis.plot.series import Series, read_series
 from limb_nodes.analysis.plot.thin import pooled, thinned
 from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
@@ -143,7 +143,7 @@ def run_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_line_holds_the_values_of_the_bag_in_the_unit_that_the_axis_names(run_bag: Path) -> None:
-    figure = picture(read_run(run_bag))
+    figure = picture(read_series(run_bag))
     limb = load_limb(PARAMS / "reference_joint_tendon.yaml")
     muscles = values_of(2, 101)
     slack = [muscle.laws["tendon"].values["slack_length"] for muscle in limb.muscles]
@@ -173,7 +173,7 @@ def test_every_line_holds_the_values_of_the_bag_in_the_unit_that_the_axis_names(
 
 
 def test_the_bag_alone_is_enough_to_draw_the_limb(run_bag: Path) -> None:
-    run = read_run(run_bag)
+    run = read_series(run_bag)
     assert run.limb is not None
     assert run.angle is not None
     figure = picture(run)
@@ -206,7 +206,7 @@ def test_a_muscle_is_drawn_as_long_as_the_model_says(angle: float) -> None:
 
 
 def test_a_posture_has_its_muscles_at_their_activation(run_bag: Path) -> None:
-    run = read_run(run_bag)
+    run = read_series(run_bag)
     assert run.limb is not None
     found = posture(run, run.limb, 40)
     assert found.time == pytest.approx(0.4)
@@ -232,7 +232,7 @@ def test_no_legend_covers_data(tmp_path: Path, bag: str) -> None:
     path = write_run(tmp_path / "run", content)
     joint = content["segments"][0]["joint"]
     reference = write_envelopes(tmp_path / "env", ["m"], [joint])
-    figure = picture(read_run(path, reference=reference))
+    figure = picture(read_series(path, reference=reference))
     figure.canvas.draw()
     legends = [legend for axes in figure.axes for legend in axes.get_children() if isinstance(legend, Legend)]
     assert len(legends) >= 3
@@ -249,7 +249,7 @@ def test_no_legend_covers_data(tmp_path: Path, bag: str) -> None:
 
 
 def test_a_bag_without_states_shows_the_rest(tmp_path: Path) -> None:
-    figure = picture(read_run(write_run(tmp_path / "run", content_of("reference_joint"), topics=REST)))
+    figure = picture(read_series(write_run(tmp_path / "run", content_of("reference_joint"), topics=REST)))
     kinds = {str(axes.get_label()).split(":")[1] for axes in figure.axes if str(axes.get_label()).count(":") == 2}
     assert kinds == {"drive", "torque", "angle", "velocity"}
 
@@ -257,14 +257,14 @@ def test_a_bag_without_states_shows_the_rest(tmp_path: Path) -> None:
 @pytest.mark.parametrize("topic", [*REST, *STATES])
 def test_a_bag_with_one_topic_is_drawn(tmp_path: Path, topic: str) -> None:
     for name, content in (("limb", content_of("arm")), ("none", None)):
-        figure = picture(read_run(write_run(tmp_path / name, content, topics=(topic,))))
+        figure = picture(read_series(write_run(tmp_path / name, content, topics=(topic,))))
         figure.canvas.draw()
         assert any(axes.lines or axes.images for axes in figure.axes)
 
 
 @pytest.mark.parametrize("count", [1, 8])
 def test_each_muscle_has_one_look_of_its_own_in_all_panels(tmp_path: Path, count: int) -> None:
-    figure = picture(read_run(write_run(tmp_path / "run", with_muscles(count))))
+    figure = picture(read_series(write_run(tmp_path / "run", with_muscles(count))))
     looks = {}
     for kind in ("drive", "muscle_force", "fibre_length"):
         lines = panel(figure, kind).lines
@@ -274,7 +274,7 @@ def test_each_muscle_has_one_look_of_its_own_in_all_panels(tmp_path: Path, count
 
 
 def test_many_units_become_a_raster(tmp_path: Path) -> None:
-    figure = picture(read_run(write_run(tmp_path / "run", with_muscles(2, units=100))))
+    figure = picture(read_series(write_run(tmp_path / "run", with_muscles(2, units=100))))
     axes = panel(figure, "frequency")
     assert len(axes.lines) == 1, "between the muscles"
     (image,) = axes.images
@@ -288,7 +288,7 @@ def test_many_units_become_a_raster(tmp_path: Path) -> None:
 
 
 def test_several_joints_stand_side_by_side_with_their_own_muscles(tmp_path: Path) -> None:
-    run = read_run(write_run(tmp_path / "run", content_of("arm")))
+    run = read_series(write_run(tmp_path / "run", content_of("arm")))
     assert run.limb is not None
     columns = columns_of(run)
     assert [column.title for column in columns] == ["shoulder", "elbow"]
@@ -306,13 +306,13 @@ def test_several_joints_stand_side_by_side_with_their_own_muscles(tmp_path: Path
 
 def test_pennate_muscles_show_their_angle_and_the_lengths_that_differ(tmp_path: Path) -> None:
     bag = write_run(tmp_path / "run", content_of("reference_joint"), pennation=0.3)
-    figure = picture(read_run(bag))
+    figure = picture(read_series(bag))
     assert_allclose(drawn(panel(figure, "pennation_angle"), look_of(0)[0]), np.degrees(0.3))
     assert_allclose(drawn(panel(figure, "muscle_length"), look_of(0)[0]), 200 + 10 * values_of(2, 101)[:, 0])
 
 
 def test_an_envelope_bag_shows_channels_and_recorded_angles(tmp_path: Path) -> None:
-    figure = picture(read_run(write_envelopes(tmp_path / "env", ["RF", "BF", "VM"], ["FX"])))
+    figure = picture(read_series(write_envelopes(tmp_path / "env", ["RF", "BF", "VM"], ["FX"])))
     found = panels(figure, "drive")
     assert [axes.get_title(loc="left") for axes in found] == [f"EMG envelope {name}" for name in ("RF", "BF", "VM")]
     for index, axes in enumerate(found):
@@ -324,7 +324,7 @@ def test_an_envelope_bag_shows_channels_and_recorded_angles(tmp_path: Path) -> N
 def test_the_recorded_angle_is_drawn_beside_the_simulated_one(tmp_path: Path) -> None:
     run = write_run(tmp_path / "run", content_of("reference_joint"))
     late = write_envelopes(tmp_path / "env", ["RF"], ["FX"], first=500)
-    figure = picture(read_run(run, reference=late))
+    figure = picture(read_series(run, reference=late))
     axes = panel(figure, "angle")
     line = next(line for line in axes.lines if line.get_label() == "recorded")
     assert_allclose(line.get_ydata(), np.degrees(values_of(1, 101)[:, 0]))
@@ -335,40 +335,40 @@ def test_the_recorded_angle_is_drawn_beside_the_simulated_one(tmp_path: Path) ->
 def test_recorded_angles_find_their_joints_by_name(tmp_path: Path) -> None:
     run = write_run(tmp_path / "run", content_of("arm"))
     named = write_envelopes(tmp_path / "named", ["RF"], ["x", "elbow"])
-    figure = picture(read_run(run, reference=named))
+    figure = picture(read_series(run, reference=named))
     shoulder, elbow = panels(figure, "angle")
     assert not any(line.get_label() == "recorded" for line in shoulder.lines)
     line = next(line for line in elbow.lines if line.get_label() == "recorded")
     assert_allclose(line.get_ydata(), np.degrees(values_of(2, 101)[:, 1]))
     other = write_envelopes(tmp_path / "other", ["RF"], ["FX"])
     with pytest.raises(UserError, match=r"FX: none is named after a joint, shoulder, elbow; .*--angle FX=shoulder"):
-        read_run(run, reference=other)
+        read_series(run, reference=other)
     none = write_envelopes(tmp_path / "none", ["RF"], [])
     with pytest.raises(UserError, match=r"no message on reference_angle; the bag has /emg_envelope"):
-        read_run(run, reference=none)
+        read_series(run, reference=none)
 
 
 def test_namespaces(tmp_path: Path) -> None:
     limb = content_of("reference_joint")
     bag = write_run(tmp_path / "left", limb, namespace="left")
     for namespace in ("", "left", "/left/"):
-        run = read_run(bag, namespace=namespace)
+        run = read_series(bag, namespace=namespace)
         assert run.limb is not None
         assert run.drive is not None
     with pytest.raises(UserError, match=r"--namespace right: no such topics in the bag; it has left"):
-        read_run(bag, namespace="right")
+        read_series(bag, namespace="right")
     two = tmp_path / "two"
     message = make_message(TOPIC_TYPES["activation"], 0, tick=0, name=["a"], activation=[0.5])
     with BagWriter(two, {}) as writer:
         for side in ("left", "right"):
             writer.write(f"/{side}/activation", 0, message)
     with pytest.raises(UserError, match=r"topics of several limbs; --namespace must be one of left, right"):
-        read_run(two)
-    assert read_run(two, namespace="right").drive is not None
+        read_series(two)
+    assert read_series(two, namespace="right").drive is not None
 
 
 def test_a_stretch_of_time(run_bag: Path) -> None:
-    run = read_run(run_bag, start=0.25, end=0.5)
+    run = read_series(run_bag, start=0.25, end=0.5)
     assert (run.start, run.end) == (0.25, 0.5)
     figure = picture(run)
     axes = panel(figure, "muscle_force")
@@ -376,8 +376,8 @@ def test_a_stretch_of_time(run_bag: Path) -> None:
     assert_allclose(drawn(axes, look_of(0)[0]), 100 * values_of(2, 101)[25:51, 0])
     figure.canvas.draw()
     # Between two samples there is nothing to draw, but nothing fails.
-    picture(read_run(run_bag, start=0.251, end=0.259)).canvas.draw()
-    assert read_run(run_bag, end=7.0).end == 1.0
+    picture(read_series(run_bag, start=0.251, end=0.259)).canvas.draw()
+    assert read_series(run_bag, end=7.0).end == 1.0
 
 
 @pytest.mark.parametrize(
@@ -392,14 +392,14 @@ def test_a_stretch_of_time(run_bag: Path) -> None:
 )
 def test_a_stretch_that_is_not_there(run_bag: Path, start: float | None, end: float | None, line: str) -> None:
     with pytest.raises(UserError, match=line):
-        read_run(run_bag, start=start, end=end)
+        read_series(run_bag, start=start, end=end)
 
 
 def test_a_bag_without_anything_to_draw(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag", {}) as bag:
         bag.write("robot_description", 0, make_message(TOPIC_TYPES["robot_description"], data="x"))
     with pytest.raises(UserError, match=r"nothing to draw, no message on any of activation, .*has /robot_description"):
-        read_run(tmp_path / "bag")
+        read_series(tmp_path / "bag")
 
 
 def test_a_limb_that_cannot_be_read_is_left_out_and_noted(tmp_path: Path) -> None:
@@ -407,7 +407,7 @@ def test_a_limb_that_cannot_be_read_is_left_out_and_noted(tmp_path: Path) -> Non
     with BagWriter(tmp_path / "bag", info) as bag:
         for k in range(3):
             bag.write("joint_states", k, make_message(TOPIC_TYPES["joint_states"], k, name=["a", "b"], position=[k, 1]))
-    run = read_run(tmp_path / "bag")
+    run = read_series(tmp_path / "bag")
     assert len(run.notes) == 1
     assert "x.yaml" in run.notes[0]
     assert len(panel(picture(run), "angle").lines) == 2

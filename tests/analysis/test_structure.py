@@ -474,11 +474,11 @@ def test_a_picture_of_the_matrices(tmp_path, capsys):
 
 
 def test_a_picture_of_a_singular_system(tmp_path):
-    from limb_nodes.analysis.structure.picture import draw
+    from limb_nodes.analysis.structure.picture import draw_structure
 
     missing = Law("tendon", "missing", (), (SLACK_LENGTH, INITIAL_LENGTH), (LENGTH_STATE,), "test")
     limb = with_law(limb_of("reference_joint_tendon"), "tendon", missing, {})
-    draw(analyse(limb), limb.name, tmp_path / "singular.png")
+    draw_structure(analyse(limb), limb.name, tmp_path / "singular.png")
     assert (tmp_path / "singular.png").stat().st_size > 20_000
 
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from limb_nodes.analysis.course import Course
+from limb_nodes.analysis.trajectory import Trajectory
 from limb_nodes.analysis.verification import CASES, balanced_angle, examine, frequency, highest_turn, lowest_turn
 from limb_nodes.cli import main
 from limb_nodes.commands.verify import write_limb
@@ -234,7 +234,7 @@ def test_a_swing_between_samples_is_measured():
     time = np.arange(0.0, 5.0, 1e-3)
     rate, middle = 2 * math.pi * 1.2345, 0.3
     swing = np.cos(rate * time + 0.1)[:, np.newaxis]
-    course = Course(
+    trajectory = Trajectory(
         time=time,
         angle=middle + 0.5 * swing,
         velocity=-0.5 * rate * np.sin(rate * time + 0.1)[:, np.newaxis],
@@ -242,7 +242,7 @@ def test_a_swing_between_samples_is_measured():
         torque=swing,
         activation=np.empty((len(time), 0)),
     )
-    assert frequency(course) == pytest.approx(1.2345, rel=1e-5)
-    assert lowest_turn(course) == pytest.approx(-0.2, abs=1e-7)
-    assert highest_turn(course) == pytest.approx(0.8, abs=1e-7)
-    assert balanced_angle(course) == pytest.approx(middle, abs=1e-6)
+    assert frequency(trajectory) == pytest.approx(1.2345, rel=1e-5)
+    assert lowest_turn(trajectory) == pytest.approx(-0.2, abs=1e-7)
+    assert highest_turn(trajectory) == pytest.approx(0.8, abs=1e-7)
+    assert balanced_angle(trajectory) == pytest.approx(middle, abs=1e-6)

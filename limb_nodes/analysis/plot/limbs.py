@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from limb_nodes.analysis.plot.panels import look_of
-from limb_nodes.analysis.plot.series import Run, Series
+from limb_nodes.analysis.plot.series import BagSeries, Series
+from limb_nodes.analysis.style import DARK, GREY, LIGHT, WHITE
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import Limb, Muscle
 from limb_nodes.model.points import points
@@ -16,7 +17,7 @@ from limb_nodes.model.points import points
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-BONE, HELD, GHOST, JOINT, DARK = "#777777", "#BBBBBB", "#E2E2E2", "#FFFFFF", "#333333"
+BONE, HELD, GHOST, JOINT = GREY, "#BBBBBB", LIGHT, WHITE
 # Part of the limb's reach that is drawn of what holds the base, where no muscle comes from further away.
 BASE = 0.12
 
@@ -48,7 +49,7 @@ def instants(angle: Series, count: int) -> list[int]:
     return sorted(int(tried[i]) for i in set(chosen))
 
 
-def posture(run: Run, limb: Limb, sample: int) -> Posture:
+def posture(run: BagSeries, limb: Limb, sample: int) -> Posture:
     """The limb at a sample of the angles."""
     assert run.angle is not None
     time = float(run.angle.times[sample])
@@ -125,10 +126,10 @@ def draw_gravity(axes: Axes, gravity: tuple[float, float]) -> None:
         arrowprops={"arrowstyle": "-|>", "color": DARK, "linewidth": 1.3},
     )
     above = "bottom" if y < -0.5 else "top" if y > 0.5 else "center"
-    axes.text(-0.3 * x, -0.3 * y, f"gravity\n{strength:.4g} m/s²", ha="center", va=above, fontsize=8.5, color=DARK)
+    axes.text(-0.3 * x, -0.3 * y, f"gravity\n{strength:.4g} m/s²", ha="center", va=above, fontsize="small", color=DARK)
 
 
-def _activation(run: Run, name: str, time: float) -> float:
+def _activation(run: BagSeries, name: str, time: float) -> float:
     if run.drive is None or name not in run.drive.names or not len(run.drive.times):
         return 0.0
     return float(np.clip(np.interp(time, run.drive.times, run.drive.column(name)), 0.0, 1.0))

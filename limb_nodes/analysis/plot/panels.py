@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from limb_nodes.analysis.plot.series import Run, Series
+from limb_nodes.analysis.plot.series import BagSeries, Series
+from limb_nodes.analysis.style import BLACK, COLOURS, PALE, STYLES
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import Limb
 
-# Okabe and Ito's colours and one of Tol's, which the colour-blind tell apart; black and grey are for joints.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#882255")
-STYLES = ("-", "--", ":", "-.")
-SIMULATED, NET, RECORDED = "#000000", "#8C8C8C", "#999999"
+SIMULATED, NET, RECORDED = BLACK, PALE, PALE
 BROAD = 2.8
 # More motor units than this in one panel become a raster.
 MOST_LINES = 6
@@ -79,7 +77,7 @@ def look_of(index: int) -> tuple[str, str]:
     return COLOURS[index % len(COLOURS)], STYLES[index // len(COLOURS) % len(STYLES)]
 
 
-def muscle_names(run: Run) -> tuple[str, ...]:
+def muscle_names(run: BagSeries) -> tuple[str, ...]:
     """The muscles of a run, in the limb's order."""
     if run.limb is not None:
         return tuple(run.limb.muscle_names)
@@ -88,7 +86,7 @@ def muscle_names(run: Run) -> tuple[str, ...]:
     return tuple(dict.fromkeys(run.owners)) or next((series.names for series in run.muscles.values()), ())
 
 
-def columns_of(run: Run) -> list[Column]:
+def columns_of(run: BagSeries) -> list[Column]:
     """The columns of a picture: one per joint, two where there is one joint; of envelopes alone, one per channel."""
     if run.angle is None and run.torque is None and not run.muscles and run.frequency is None:
         return _envelope_columns(run)
@@ -110,7 +108,7 @@ def _aligned(columns: list[Column]) -> list[Column]:
     return [Column(column.title, column.muscles, tuple(row[i] for row in rows)) for i, column in enumerate(columns)]
 
 
-def _joints(run: Run) -> tuple[str, ...]:
+def _joints(run: BagSeries) -> tuple[str, ...]:
     if run.limb is not None:
         return tuple(run.limb.joint_names)
     return next((series.names for series in (run.angle, run.torque) if series is not None), ())
@@ -120,7 +118,7 @@ def _muscles_of(limb: Limb, joint: str) -> tuple[str, ...]:
     return tuple(muscle.name for muscle in limb.muscles if limb.joint_names[muscle.joint] == joint)
 
 
-def _column(run: Run, title: str, muscles: Sequence[str], *joints: str) -> Column:
+def _column(run: BagSeries, title: str, muscles: Sequence[str], *joints: str) -> Column:
     """The panels of some joints and the muscles over them, always as many."""
     panels = [
         _drive(run, muscles),
@@ -136,7 +134,7 @@ def _column(run: Run, title: str, muscles: Sequence[str], *joints: str) -> Colum
     return Column(title, legend, tuple(panels))
 
 
-def _with_role(run: Run, name: str) -> str:
+def _with_role(run: BagSeries, name: str) -> str:
     if run.limb is None:
         return name
     role = run.limb.muscles[run.limb.muscle_names.index(name)].role
@@ -144,7 +142,7 @@ def _with_role(run: Run, name: str) -> str:
     return name if name == short else f"{name} ({short})"
 
 
-def _muscle_lines(run: Run, series: Series, muscles: Sequence[str], factor: float = 1.0) -> tuple[Line, ...]:
+def _muscle_lines(run: BagSeries, series: Series, muscles: Sequence[str], factor: float = 1.0) -> tuple[Line, ...]:
     known = muscle_names(run)
     found = []
     for name in muscles:
@@ -154,7 +152,7 @@ def _muscle_lines(run: Run, series: Series, muscles: Sequence[str], factor: floa
     return tuple(found)
 
 
-def _drive(run: Run, muscles: Sequence[str]) -> Panel | None:
+def _drive(run: BagSeries, muscles: Sequence[str]) -> Panel | None:
     if run.drive is None:
         return None
     lines = _muscle_lines(run, run.drive, muscles)
@@ -168,7 +166,7 @@ def _drive_limits(drive: Series) -> tuple[float, float]:
     return -0.03 * top, 1.04 * top
 
 
-def _frequency(run: Run, muscles: Sequence[str]) -> Panel | None:
+def _frequency(run: BagSeries, muscles: Sequence[str]) -> Panel | None:
     """Lines for a few units, the first recruited thinnest; a raster for many."""
     if run.frequency is None:
         return None
@@ -193,7 +191,7 @@ def _frequency(run: Run, muscles: Sequence[str]) -> Panel | None:
 
 
 def _of_muscles(
-    run: Run, muscles: Sequence[str], field: str, title: str, unit: str, factor: float = 1.0
+    run: BagSeries, muscles: Sequence[str], field: str, title: str, unit: str, factor: float = 1.0
 ) -> Panel | None:
     if field not in run.muscles:
         return None
@@ -221,7 +219,7 @@ def _of_joint(text: str, joints: Sequence[str]) -> str:
     return f"{text} {joints[0]}" if len(joints) == 1 and len(joints[0]) <= 10 else text.split()[0]
 
 
-def _torque(run: Run, muscles: Sequence[str], joints: Sequence[str]) -> Panel | None:
+def _torque(run: BagSeries, muscles: Sequence[str], joints: Sequence[str]) -> Panel | None:
     by_muscle = _muscle_lines(run, run.muscles["torque"], muscles) if "torque" in run.muscles else ()
     net = _joint_lines(run.torque, joints, "net torque") if run.torque is not None else []
     if not by_muscle and not net:
@@ -232,7 +230,7 @@ def _torque(run: Run, muscles: Sequence[str], joints: Sequence[str]) -> Panel | 
     return Panel("torque", _of_joint("Torque at the", joints), "N m", (*broad, *thin), legend=True)
 
 
-def _angle(run: Run, joints: Sequence[str]) -> Panel | None:
+def _angle(run: BagSeries, joints: Sequence[str]) -> Panel | None:
     if run.angle is None:
         return None
     recorded = [] if run.reference is None else [joint for joint in joints if joint in run.reference.names]
@@ -252,14 +250,14 @@ def _angle(run: Run, joints: Sequence[str]) -> Panel | None:
     return Panel("angle", _of_joint("Angle of the", joints), "deg", tuple(lines), bounds=bounds, legend=True)
 
 
-def _velocity(run: Run, joints: Sequence[str]) -> Panel | None:
+def _velocity(run: BagSeries, joints: Sequence[str]) -> Panel | None:
     if run.velocity is None:
         return None
     lines = _joint_lines(run.velocity, joints, "", 180.0 / np.pi)
     return Panel("velocity", _of_joint("Velocity of the", joints), "deg/s", tuple(lines), legend=len(lines) > 1)
 
 
-def _lengths(run: Run, muscles: Sequence[str]) -> list[Panel | None]:
+def _lengths(run: BagSeries, muscles: Sequence[str]) -> list[Panel | None]:
     """Lengths that differ: without tendon the muscle is as long as the path, without pennation the fibres are too."""
     fields = run.muscles
     if not fields:
@@ -278,7 +276,7 @@ def _lengths(run: Run, muscles: Sequence[str]) -> list[Panel | None]:
     ]
 
 
-def _tendon(run: Run, muscles: Sequence[str]) -> Panel | None:
+def _tendon(run: BagSeries, muscles: Sequence[str]) -> Panel | None:
     """Tendons stretch by little, so that they are drawn from their slack lengths on."""
     series = run.muscles["tendon_length"]
     slack = {}
@@ -299,7 +297,7 @@ def _tendon(run: Run, muscles: Sequence[str]) -> Panel | None:
     return Panel("tendon_length", "Tendon length beyond slack length", "mm", lines)
 
 
-def _envelope_columns(run: Run) -> list[Column]:
+def _envelope_columns(run: BagSeries) -> list[Column]:
     """A panel per channel, for envelopes over each other hide each other; the recorded angles below."""
     panels = []
     if run.drive is not None:

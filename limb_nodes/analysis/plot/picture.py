@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from limb_nodes.analysis.plot.limbs import Posture, draw_gravity, draw_limb, frame, instants, posture
 from limb_nodes.analysis.plot.panels import Column, Panel, Raster, columns_of
-from limb_nodes.analysis.plot.series import Run
+from limb_nodes.analysis.plot.series import BagSeries
 from limb_nodes.analysis.plot.thin import pooled, thinned
-from limb_nodes.errors import UserError
+from limb_nodes.analysis.style import GREY, PALE, new_figure, styled
 from limb_nodes.model import Limb
 
 if TYPE_CHECKING:
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.gridspec import SubplotSpec
     from matplotlib.legend import Legend
 
-SUFFIXES = (".png", ".pdf", ".svg")
 INSTANTS = 7
 # Inches, but for the part of a posture's width that gravity takes.
 HEAD_HEIGHT, LEGEND_HEIGHT, ROW_HEIGHT = 0.45, 0.3, 1.45
@@ -29,98 +27,54 @@ COLUMN_WIDTH, LEAST_WIDTH, LEAST_STRIP, MOST_STRIP = 5.4, 9.0, 0.7, 3.5
 GRAVITY_WIDTH, LEGEND_GAP = 0.55, 0.3
 LEGEND_COLUMNS = 4
 LARGEST_DPI = 1200
-STYLE: Any = {
-    "font.size": 10,
-    "axes.titlesize": 10.5,
-    "axes.titlelocation": "left",
-    "axes.titlepad": 5,
-    "axes.labelsize": 9.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#E6E6E6",
-    "grid.linewidth": 0.7,
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "legend.fontsize": 9,
-    "xtick.labelsize": 9,
-    "ytick.labelsize": 9,
-    "svg.hashsalt": "limb",
-    "pdf.fonttype": 42,
-}
 
 
-def picture(run: Run) -> Figure:
+@styled
+def picture(run: BagSeries) -> Figure:
     """Draw a run. Every axes of a panel is labelled `column:kind:title`, of a limb `limb:time`."""
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
-
-    with matplotlib.rc_context(STYLE):
-        columns = columns_of(run)
-        limb = run.limb if _has_limb(run) else None
-        postures = _postures(run, limb) if limb is not None else []
-        width = max(COLUMN_WIDTH * len(columns), LEAST_WIDTH)
-        strip = _strip_height(postures, width)
-        legends = max(_legend_rows(column) for column in columns) * LEGEND_HEIGHT
-        body = max(len(column.panels) for column in columns) * ROW_HEIGHT
-        layout = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06, hspace=0.0, wspace=0.02)
-        figure = Figure(figsize=(width, HEAD_HEIGHT + strip + legends + body), layout=layout)
-        FigureCanvasAgg(figure)
-        heights = {"strip": strip, "legends": legends, "body": body}
-        heights = {name: height for name, height in heights.items() if height}
-        places = figure.add_gridspec(len(heights), 1, height_ratios=list(heights.values()))
-        parts = {name: places[row] for row, name in enumerate(heights)}
-        _headings(figure, run)
-        if limb is not None and postures:
-            _limbs(figure, parts["strip"], limb, postures)
-        if "legends" in parts:
-            # Holds the room for the legends, which follow the panels below it.
-            figure.add_subplot(parts["legends"], label="room").axis("off")
-        marks = [shown.time for shown in postures]
-        body_places = parts["body"].subgridspec(1, len(columns))
-        for index, column in enumerate(columns):
-            _column(figure, body_places[index], index, column, run, marks)
-        return figure
+    columns = columns_of(run)
+    postures = _postures(run)
+    width = max(COLUMN_WIDTH * len(columns), LEAST_WIDTH)
+    heights = {
+        "strip": _strip_height(postures, width),
+        "legends": max(_legend_rows(column) for column in columns) * LEGEND_HEIGHT,
+        "body": max(len(column.panels) for column in columns) * ROW_HEIGHT,
+    }
+    figure = new_figure(width, HEAD_HEIGHT + sum(heights.values()))
+    heights = {name: height for name, height in heights.items() if height}
+    places = figure.add_gridspec(len(heights), 1, height_ratios=list(heights.values()))
+    parts = {name: places[row] for row, name in enumerate(heights)}
+    _headings(figure, run)
+    if run.limb is not None and postures:
+        _limbs(figure, parts["strip"], run.limb, postures)
+    if "legends" in parts:
+        # Holds the room for the legends, which follow the panels below it.
+        figure.add_subplot(parts["legends"], label="room").axis("off")
+    marks = [shown.time for shown in postures]
+    body = parts["body"].subgridspec(1, len(columns))
+    for index, column in enumerate(columns):
+        _column(figure, body[index], index, column, run, marks)
+    return figure
 
 
-def save(figure: Figure, path: Path, dpi: float) -> None:
-    """Write a picture, whole or not at all. Raises UserError where it cannot be written."""
-    import matplotlib
-
-    part = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    dates = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}, ".png": {}}
-    try:
-        with matplotlib.rc_context(STYLE):
-            figure.savefig(part, dpi=dpi, metadata=dates[path.suffix.lower()])
-        os.replace(part, path)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
-        raise UserError(f"--out {path}: can't be written: {reason}") from None
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def _has_limb(run: Run) -> bool:
-    return run.limb is not None and run.angle is not None and set(run.limb.joint_names) <= set(run.angle.names)
-
-
-def _headings(figure: Figure, run: Run) -> None:
+def _headings(figure: Figure, run: BagSeries) -> None:
     name = run.limb.name if run.limb is not None else Path(run.source).name or run.path.resolve().name
     facts = [f"bag {run.path.resolve().name}", f"{run.start:g} to {run.end:g} s"]
     if run.rate is not None:
         facts.append(f"{run.rate:g} Hz")
     if run.version:
         facts.append(f"limb_nodes {run.version}")
-    figure.suptitle(name.replace("_", " "), fontsize=16, fontweight="bold", x=0.012, ha="left")
+    figure.suptitle(name.replace("_", " "), x=0.012, ha="left")
     # Beside the title, so that it takes no room of its own.
-    figure.text(0.988, 1.0 - 0.12 / figure.get_figheight(), "  ·  ".join(facts), ha="right", va="top", fontsize=9.5,
-                color="#555555")  # fmt: skip
+    height = 1.0 - 0.12 / figure.get_figheight()
+    figure.text(0.988, height, "  ·  ".join(facts), ha="right", va="top", fontsize="small", color=GREY)
 
 
-def _postures(run: Run, limb: Limb) -> list[Posture]:
-    assert run.angle is not None
+def _postures(run: BagSeries) -> list[Posture]:
+    """The limb at some instants, none if the bag does not hold both limb and angles."""
+    limb = run.limb
+    if limb is None or run.angle is None or not set(limb.joint_names) <= set(run.angle.names):
+        return []
     return [posture(run, limb, sample) for sample in instants(run.angle, INSTANTS)]
 
 
@@ -129,8 +83,8 @@ def _strip_height(postures: list[Posture], width: float) -> float:
     if not postures:
         return 0.0
     left, right, bottom, top = frame(postures)
-    needed = 0.82 * width / (len(postures) + GRAVITY_WIDTH) * (top - bottom) / (right - left)
-    return min(max(needed, LEAST_STRIP), MOST_STRIP) + 0.3
+    height = 0.82 * width / (len(postures) + GRAVITY_WIDTH) * (top - bottom) / (right - left)
+    return min(max(height, LEAST_STRIP), MOST_STRIP) + 0.3
 
 
 def _limbs(figure: Figure, place: SubplotSpec, limb: Limb, postures: list[Posture]) -> None:
@@ -146,7 +100,7 @@ def _limbs(figure: Figure, place: SubplotSpec, limb: Limb, postures: list[Postur
         axes.set(aspect="equal", xlim=(left, right), ylim=(bottom, top))
         axes.axis("off")
         draw_limb(axes, limb, shown, [other for other in postures if other is not shown])
-        axes.set_title(f"{shown.time:.2f} s", loc="center", fontsize=9.5)
+        axes.set_title(f"{shown.time:.2f} s", loc="center", fontsize="small")
 
 
 def _legend_rows(column: Column) -> int:
@@ -176,7 +130,7 @@ def _legend(axes: Axes, column: Column) -> Legend:
     return legend
 
 
-def _column(figure: Figure, place: SubplotSpec, index: int, column: Column, run: Run, marks: list[float]) -> None:
+def _column(figure: Figure, place: SubplotSpec, index: int, column: Column, run: BagSeries, marks: list[float]) -> None:
     grid = place.subgridspec(len(column.panels), 1)
     first: Axes | None = None
     filled = [row for row, panel in enumerate(column.panels) if panel is not None]
@@ -188,7 +142,7 @@ def _column(figure: Figure, place: SubplotSpec, index: int, column: Column, run:
         _panel(axes, panel, run)
         if panel.kind == "angle":
             for mark in marks:
-                axes.axvline(mark, color="#999999", linewidth=0.9, linestyle=":", zorder=1)
+                axes.axvline(mark, color=PALE, linewidth=0.9, linestyle=":", zorder=1)
         axes.set_xlim(run.start, run.end if run.end > run.start else run.start + 1e-3)
         axes.tick_params(labelbottom=row == filled[-1])
         if row == filled[-1]:
@@ -198,7 +152,7 @@ def _column(figure: Figure, place: SubplotSpec, index: int, column: Column, run:
         first.add_artist(_legend(first, column))
 
 
-def _panel(axes: Axes, panel: Panel, run: Run) -> None:
+def _panel(axes: Axes, panel: Panel, run: BagSeries) -> None:
     axes.set_title(panel.title).set_in_layout(False)
     axes.set_ylabel(panel.unit)
     if panel.raster is not None:
@@ -220,7 +174,7 @@ def _panel(axes: Axes, panel: Panel, run: Run) -> None:
     if panel.legend and handles:
         legend = axes.legend(
             *zip(*handles, strict=True), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4,
-            borderaxespad=0.1, handlelength=1.6, columnspacing=1.0, fontsize=8.5,
+            borderaxespad=0.1, handlelength=1.6, columnspacing=1.0, fontsize="small",
         )  # fmt: skip
         legend.set_in_layout(False)
 
@@ -231,11 +185,11 @@ def _bounds(axes: Axes, bounds: tuple[float, float]) -> None:
     near = 0.1 * (high - low)
     seen = [bound for bound in bounds if low - near <= bound <= high + near]
     for index, bound in enumerate(seen):
-        axes.axhline(bound, color="#777777", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1,
+        axes.axhline(bound, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1,
                      label="end of range" if index == 0 else "_")  # fmt: skip
 
 
-def _raster(axes: Axes, raster: Raster, run: Run) -> None:
+def _raster(axes: Axes, raster: Raster, run: BagSeries) -> None:
     """Frequencies as colours; white where a unit is silent."""
     import matplotlib
 
@@ -252,12 +206,12 @@ def _raster(axes: Axes, raster: Raster, run: Run) -> None:
         )  # fmt: skip
         bar = axes.inset_axes((1.012, 0.0, 0.018, 1.0))
         bar.set_label("colours")
-        axes.figure.colorbar(image, cax=bar).set_label(raster.unit, fontsize=9)
+        axes.figure.colorbar(image, cax=bar).set_label(raster.unit)
     names = list(dict.fromkeys(raster.muscles))
     sizes = [raster.muscles.count(name) for name in names]
     ends = np.cumsum(sizes)
     for end in ends[:-1]:
-        axes.axhline(end, color="#888888", linewidth=0.8)
+        axes.axhline(end, color=GREY, linewidth=0.8)
     axes.set_yticks(ends - np.array(sizes) / 2, names)
     for label, name in zip(axes.get_yticklabels(), names, strict=True):
         label.set_color(raster.colours[raster.muscles.index(name)])

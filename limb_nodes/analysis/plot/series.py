@@ -45,7 +45,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Run:
+class BagSeries:
     """What a bag holds. A series is None, or missing in `muscles`, where the bag lacks its topic.
 
     limb: None in a bag without one, such as an envelope bag. drive: activations, or the envelopes of a bag without
@@ -128,14 +128,14 @@ class _Bag:
         return info if isinstance(info, dict) else {}
 
 
-def read_run(
+def read_series(
     path: str | Path,
     *,
     namespace: str = "",
     start: float | None = None,
     end: float | None = None,
     reference: str | Path | None = None,
-) -> Run:
+) -> BagSeries:
     """Read what a picture of a bag shows.
 
     Args:
@@ -166,7 +166,7 @@ def read_run(
     if "reference" in found and "angle" in found:
         found["reference"] = _matched(found["reference"], found["angle"].names, reference, notes)
     first, last = _shown(path, bag, start, end)
-    return Run(
+    return BagSeries(
         Path(path),
         limb,
         float(info["rate"]) if isinstance(info.get("rate"), (int, float)) else None,

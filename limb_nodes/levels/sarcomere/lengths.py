@@ -4,6 +4,8 @@ Report symbols: l_myosin myosin_length, l_actin actin_length, l_S^opt optimal_sa
 l_S^max maximum_sarcomere_length, l_S^min minimum_sarcomere_length.
 """
 
+from collections.abc import Mapping
+
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.levels.equation import equation, equation_of
 
@@ -49,3 +51,8 @@ PARAMETERS = (
 EQUATIONS = tuple(
     equation_of(function) for function in (optimal_sarcomere_length, maximum_sarcomere_length, minimum_sarcomere_length)
 )
+
+
+def sarcomere_lengths(values: Mapping[str, float]) -> dict[str, float]:
+    """Optimal, longest and shortest length (m) by the name of the variable. values: the lengths of the filaments."""
+    return {item.defines: item.function(*(values[name] for name in item.uses)) for item in EQUATIONS}

@@ -17,12 +17,12 @@ STATES = {"muscle_state": MUSCLE_FIELDS, "motor_unit_state": UNIT_FIELDS, "sarco
 
 
 @dataclass(frozen=True)
-class Course:
-    """The course of T instants, n joints. SI units, radians.
+class Trajectory:
+    """The movement of T instants, n joints. SI units, radians.
 
     time: [T]. angle, velocity, acceleration, torque: of the joints [T, n]. activation: of the muscles, as given [T, m].
     muscle, unit, sarcomere: by field of MuscleState [T, m], MotorUnitState and SarcomereState [T, units]; empty
-    where they were not recorded.
+    if they were not recorded.
     """
 
     time: FloatArray
@@ -36,12 +36,12 @@ class Course:
     sarcomere: dict[str, FloatArray] = field(default_factory=dict)
 
 
-def course_of_movement(limb: Limb, movement: Movement) -> Course:
-    """The course of a movement that was solved with its outputs."""
+def trajectory_of_movement(limb: Limb, movement: Movement) -> Trajectory:
+    """The trajectory of a movement that was solved with its outputs."""
     torque = np.zeros_like(movement.angle)
     for index, muscle in enumerate(limb.muscles):
         torque[:, muscle.joint] += movement.muscle["muscle_torque"][:, index]
-    return Course(
+    return Trajectory(
         time=movement.time,
         angle=movement.angle,
         velocity=movement.velocity,
@@ -54,8 +54,8 @@ def course_of_movement(limb: Limb, movement: Movement) -> Course:
     )
 
 
-def course_of_bag(path: str | Path) -> Course:
-    """The course that the bag of a run holds, states at every tick or not at all. Raises UserError."""
+def trajectory_of_bag(path: str | Path) -> Trajectory:
+    """The trajectory that the bag of a run holds, states at every tick or not at all. Raises UserError."""
     with BagReader(path) as bag:
         pattern = bag.table("movement_pattern")
         states: dict[str, dict[str, FloatArray]] = {topic: {} for topic in STATES}
@@ -63,7 +63,7 @@ def course_of_bag(path: str | Path) -> Course:
             if bag.has(topic):
                 table = bag.table(topic)
                 states[topic] = {key: table[key] for key in fields}
-        return Course(
+        return Trajectory(
             time=pattern["time"],
             angle=pattern["angle"],
             velocity=pattern["velocity"],
