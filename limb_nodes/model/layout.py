@@ -93,8 +93,8 @@ class Layout:
         return replace(self, limb=limb, model=model)
 
 
-def evaluate(equations: list[BoundEquation], values: dict[str, float]) -> None:
-    """Evaluate equations in order and add what they define to `values`."""
+def define(equations: list[BoundEquation], values: dict[str, float]) -> None:
+    """Add to `values` what equations define, in their order."""
     for bound in equations:
         values[bound.defines] = bound.equation.function(*(values[s] for s in bound.symbols))
 
@@ -104,7 +104,7 @@ def unit_values(unit: MotorUnit, kind: UnitKind) -> dict[str, float]:
     values = dict(unit.values)
     for process, chosen in unit.laws.items():
         values.update({f"{process}__{name}": value for name, value in chosen.values.items()})
-    evaluate(kind.stages["load"], values)
+    define(kind.stages["load"], values)
     return values
 
 
@@ -113,7 +113,7 @@ def muscle_values(muscle: Muscle, kind: MuscleKind) -> dict[str, float]:
     values = {"role": muscle.role}
     for process, chosen in muscle.laws.items():
         values.update({f"{process}__{name}": value for name, value in chosen.values.items()})
-    evaluate(kind.stages["load"], values)
+    define(kind.stages["load"], values)
     return values
 
 

@@ -30,7 +30,7 @@ from limb_nodes.solve.whole import SolveError, WholeModel
 SUPPORT = Segment("bench", "bench", 1.0, 1.0, 0.5, 1.0, 0.0, 0.0, None)
 
 Start = Literal["rest", "steady", "file"]
-# A state is steady where it changes by less than this part of its typical size in a second.
+# A state is steady if it changes by less than this part of its typical size in a second.
 STEADY = 1e-9
 LONGEST_SETTLING = 1000.0
 
@@ -49,7 +49,7 @@ class Course:
     smooth: bool = False
 
     def at(self, time: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-        """Length (m) at some times, and its rate of change (m/s) where the course is smooth."""
+        """Length (m) at some times, and its rate of change (m/s) if the course is smooth."""
         if not self.smooth or len(self.time) < 2:
             return np.interp(time, self.time, self.length), None
         curve = PchipInterpolator(self.time, self.length)
@@ -130,13 +130,13 @@ class BenchRecord:
 
     @property
     def work(self) -> float:
-        """Work (J) that the muscle has done by shortening; negative where it was stretched."""
+        """Work (J) that the muscle has done by shortening; negative if it was stretched."""
         shortening = -np.diff(self.muscle_tendon_length)
         return float(np.sum(0.5 * (self.force[1:] + self.force[:-1]) * shortening))
 
 
 def on_bench(limb: Limb, name: str) -> tuple[Limb, Muscle]:
-    """A limb of this muscle alone, its path replaced; the muscle. Raises UserError where there is none."""
+    """A limb of this muscle alone, its path replaced; the muscle. Raises UserError if there is none."""
     if name not in limb.muscle_names:
         names = ", ".join(limb.muscle_names)
         raise UserError(f"{limb.file}: has no muscle {name!r}; allowed: {names or 'none, it has no muscles'}")
@@ -149,7 +149,7 @@ def on_bench(limb: Limb, name: str) -> tuple[Limb, Muscle]:
 class MuscleBench:
     """One muscle of a limb, taken off its joint.
 
-    state_names: internal states, such as ``tendon_length`` or ``unit.bonds``. Raises UserError where
+    state_names: internal states, such as ``tendon_length`` or ``unit.bonds``. Raises UserError if
     the limb has no such muscle.
     """
 
@@ -162,7 +162,7 @@ class MuscleBench:
     def adopt(self, limb: Limb) -> None:
         """Take over the numbers of the same muscle of a limb that differs in nothing but numbers.
 
-        Far quicker than a new bench, for fits and scans. Raises ValueError where its laws or units differ.
+        Far quicker than a new bench, for fits and scans. Raises ValueError if its laws or units differ.
         """
         changed, muscle = on_bench(limb, self.muscle.name)
         new = build_layout(changed)
@@ -179,7 +179,7 @@ class MuscleBench:
     def optimal_length(self) -> float:
         """Length (m) from origin to insertion at which fibres of mean optimal length hang on a slack tendon.
 
-        Raises UserError where no length gives it, as an aponeurosis may have it.
+        Raises UserError if no length gives it, as an aponeurosis may have it.
         """
         optimal = [
             unit.values["series_sarcomeres"] * optimal_sarcomere_length(unit.laws["sarcomere"].values["actin_length"])
@@ -218,7 +218,7 @@ class MuscleBench:
         initial: states at the first time. "rest": those in which the muscle, held at the first
             length, settles without excitation; "steady": the same with the first excitation;
             "file": those of the limb's file; or states by name, the others as in the file.
-        Raises UserError for times, lengths or excitations that make no sense, SolveError where the
+        Raises UserError for times, lengths or excitations that make no sense, SolveError if the
         equations cannot be solved further.
         """
         time, length = np.asarray(time, dtype=np.float64), np.asarray(length, dtype=np.float64)
@@ -246,7 +246,7 @@ class MuscleBench:
         """Internal states (SI units, as `state_names`) at which the held muscle rests.
 
         length: m. start: states to start from, those of the file by default: tendon and aponeurosis
-        stay slack where nothing pulls them. Raises SolveError where the muscle finds no rest.
+        stay slack if nothing pulls them. Raises SolveError if the muscle finds no rest.
         """
         layout, program, stepper = self.model.layout, self.model.program, self.stepper
         state = layout.initial_states.copy() if start is None else start.copy()
@@ -271,10 +271,10 @@ class MuscleBench:
                 return state
             if change < 1e-2:
                 # Close enough for Newton's method to find the same rest.
-                found = root(lambda scaled: rates(scaled * scale), state / scale, tol=1e-14).x * scale
-                near = np.abs(found - state).max() <= 0.1 * np.abs(state).max()
-                if near and np.abs(rates(found)).max() <= STEADY:
-                    return np.asarray(found, dtype=np.float64)
+                rest = root(lambda scaled: rates(scaled * scale), state / scale, tol=1e-14).x * scale
+                near = np.abs(rest - state).max() <= 0.1 * np.abs(state).max()
+                if near and np.abs(rates(rest)).max() <= STEADY:
+                    return np.asarray(rest, dtype=np.float64)
             stepper.internal = state
             stepper.advance(held, held, drive[0], drive[0], span)
             state = stepper.internal

@@ -20,7 +20,7 @@ def data_type(layout: Layout) -> np.dtype[Any]:
     load: [3], force on the tip in x and y (N) and torque on it (N m).
     locked: [n], 1 or -1 while a joint rests on its highest or lowest angle, else 0.
     torque: [n], of the muscles about each joint (N m). acceleration: [n], of the joints (rad/s^2).
-    held: [7, n], the torque of a tick, its slopes, where it holds and its curvature (`limb_nodes.solve.held`).
+    held: [7, n], the torque of a tick, its slopes, its state and its curvature (`limb_nodes.solve.held`).
     angles_before, velocities_before, angles_after, velocities_after: [n], joint states at a tick's ends
         (rad, rad/s), between which the muscles follow a cubic.
     chain: what the chain's equations keep from one stage to the next (`limb_nodes.solve.chain`).

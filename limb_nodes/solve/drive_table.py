@@ -16,7 +16,7 @@ from limb_nodes.foundation.records import Record
 from limb_nodes.model.layout import Layout
 from limb_nodes.solve.pointer import Callback
 from limb_nodes.solve.problem import evaluate, new_problem
-from limb_nodes.solve.table import BUCKETS, NODES, TOLERANCE, Table, Wanted, tabulate
+from limb_nodes.solve.table import BUCKETS, NODES, TOLERANCE, Table, tabulate
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -81,9 +81,11 @@ class DriveTable:
         single = self._of_muscle, np.array([muscle])
         searched = single if units.size == 1 else (self._of_unit, units)
         first, last = self._spans[muscle]
-        # A drive is at most of the order of 1. Rounding grows with the number of units that are summed.
-        wanted = Wanted((first, last), (0.0, 1.0), np.ones(last - first), TOLERANCE * max(1.0, 0.1 * units.size))
-        return tabulate(self._of_muscle, muscle, searched, wanted)
+        # Rounding grows with the number of units that are summed.
+        tolerance = TOLERANCE * max(1.0, 0.1 * units.size)
+        # A drive is at most of the order of 1.
+        scale = np.ones(last - first)
+        return tabulate(self._of_muscle, muscle, searched, (first, last), (0.0, 1.0), scale, tolerance)
 
     def look_up(self, excitation: FloatArray) -> FloatArray:
         """Drives [T, drives] of excitations [T, muscles]."""

@@ -23,7 +23,7 @@ from limb_nodes.solve.whole import METHODS, TOLERANCE, Movement, Stretch, WholeM
 
 Samples = Iterable[Values] | Mapping[str, FloatArray]
 Task = TypeVar("Task")
-Found = TypeVar("Found")
+Started = TypeVar("Started")
 # Samples or chunks that are under way or wait to be taken, per thread: they bound the memory.
 AHEAD = 4
 # Samples that travel to a worker of a cluster at once.
@@ -217,16 +217,16 @@ def in_threads(
 
 def flow(
     tasks: Iterable[Task],
-    begin: Callable[[Task], Found],
+    begin: Callable[[Task], Started],
     ahead: int,
-    first: Callable[[deque[Found]], Found] | None,
-) -> Iterator[Found]:
+    first: Callable[[deque[Started]], Started] | None,
+) -> Iterator[Started]:
     """Begin tasks, at most `ahead` before the one that is taken next.
 
     first: picks the next of those that run; None takes them in their order.
     """
     source = iter(tasks)
-    running: deque[Found] = deque()
+    running: deque[Started] = deque()
     while True:
         running.extend(begin(task) for task in islice(source, ahead - len(running)))
         if not running:
@@ -290,9 +290,9 @@ def on_cluster(
     for future in flow(chunks, begin, AHEAD * running, None if ordered else first):
         numbers = indices.pop(future.key)
         try:
-            found = future.result()
+            results = future.result()
         except Exception as problem:
             # A worker that died, say: the others go on.
-            found = [(index, problem) for index in numbers]
+            results = [(index, problem) for index in numbers]
         future.release()
-        yield from found
+        yield from results

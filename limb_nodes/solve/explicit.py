@@ -14,7 +14,7 @@ from numba import carray
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.method import BETWEEN, STEP, Method, judge
 from limb_nodes.solve.pointer import callback, numbers_at
-from limb_nodes.solve.problem import evaluate, work_of, work_rows
+from limb_nodes.solve.problem import evaluate, work_at, work_of
 
 
 class Explicit(NamedTuple):
@@ -81,9 +81,9 @@ def combine(weights, stages, count, i):
 @callback(*STEP)
 def step(t, h, method_, work_, control_, problem_):
     """One step of size h; the first stage holds the rates at t, the last then those at t + h."""
-    method, control, problem = carray(method_, 1)[0], carray(control_, 1)[0], carray(problem_, 1)[0]
+    method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
     n, tableau = problem.states, tableau_of(method)
-    work = work_of(carray(work_, (work_rows(problem, method), n)), problem, method)
+    work = work_of(work_at(work_, problem, method), problem, method)
     for i in range(n):
         work.stages[0, i] = work.start_rates[i]
     # The second stage is a part of a step by Euler's method.
@@ -99,7 +99,7 @@ def step(t, h, method_, work_, control_, problem_):
     errors = work.stage_state
     for i in range(n):
         errors[i] = h * combine(tableau.error, work.stages, method.stages, i)
-    judge(errors, work, control)
+    judge(errors, work, carray(control_, 1)[0])
 
 
 @callback(*BETWEEN)
@@ -107,7 +107,7 @@ def between(t, h, count, times_, out_, method_, work_, problem_):
     """States at times from t to t + h, of fourth order."""
     method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
     n, tableau = problem.states, tableau_of(method)
-    work = work_of(carray(work_, (work_rows(problem, method), n)), problem, method)
+    work = work_of(work_at(work_, problem, method), problem, method)
     times, out = carray(times_, (count,)), carray(out_, (count, n))
     last = method.stages - 1
     for i in range(n):

@@ -125,7 +125,7 @@ class Body:
         self.active |= set(names) & used
 
     def compute(self, bound: Iterable[BoundEquation], indent: str = "") -> None:
-        """Evaluate equations in order, with tangents where something active goes in."""
+        """Evaluate equations in order, with tangents if something active goes in."""
         for item in bound:
             function = item.equation.function
             varying = frozenset(
@@ -163,10 +163,10 @@ def used_by(*stages: Iterable[BoundEquation]) -> set[str]:
 
 def upstream(bound: list[BoundEquation], wanted: set[str]) -> list[BoundEquation]:
     """Those of some equations on which wanted variables depend, in order."""
-    needed, kept = set(wanted), []
+    used, kept = set(wanted), []
     for item in reversed(bound):
-        if item.defines in needed:
-            needed.update(item.symbols)
+        if item.defines in used:
+            used.update(item.symbols)
             kept.append(item)
     return kept[::-1]
 
@@ -229,7 +229,7 @@ def unit_before(equations: Equations, number: int, kind: UnitKind, states: list[
 
 
 def force_inputs(kind: UnitKind) -> dict[str, str]:
-    """What a unit's force needs beside the fibre velocity, and where it stands for the group {own}."""
+    """What a unit's force needs beside the fibre velocity, and its place for the group {own}."""
     used = used_by(upstream(kind.stages["loop"], {"fibre_force"})) | {"fibre_force"}
     places = {name: f"model.parameters[{{own}}.parameters + {i}]" for i, name in enumerate(kind.columns)}
     places |= {name: f"data.scratch[{{own}}.scratch + {i}]" for i, name in enumerate(kind.kept)}
@@ -450,7 +450,7 @@ def newton(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
     """Find the total fibre force F that the fibres exert at the velocity that F allows.
 
     The force falls with the fibre velocity, which rises with F: total(F) never rises, so the root
-    is unique and lies between any F and total(F). The last root found is where the search starts.
+    is unique and lies between any F and total(F). The search starts at the last root.
     """
     inner = Body(body.equations, {"total_fibre_force"})
     inner.compute(kind.stages["loop"])

@@ -12,8 +12,8 @@ from limb_nodes.solve.inner import inner
 class HeldTorque(NamedTuple):
     """Torque of n joints around a joint state, each [n]; views of the rows of one array [7, n].
 
-    torque: N m. by_angle: N m/rad. by_velocity: N m s/rad. by_time: N m/s. angle, velocity: where it
-    holds (rad, rad/s). curvature: half the second derivative in time that the tick before has shown (N m/s^2).
+    torque: N m. by_angle: N m/rad. by_velocity: N m s/rad. by_time: N m/s. angle, velocity: at which
+    it holds (rad, rad/s). curvature: half the second derivative in time that the tick before has shown (N m/s^2).
     """
 
     torque: Any

@@ -15,7 +15,7 @@ from numba import carray
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.method import BETWEEN, STEP, Method, judge
 from limb_nodes.solve.pointer import callback, numbers_at
-from limb_nodes.solve.problem import evaluate, work_of, work_rows
+from limb_nodes.solve.problem import evaluate, work_at, work_of
 
 
 class Rosenbrock(NamedTuple):
@@ -120,9 +120,9 @@ def solve(matrix, pivots, right):
 @callback(*STEP)
 def step(t, h, method_, work_, control_, problem_):
     """One step of size h; the stages hold the increments, the last of them the estimated error."""
-    method, control, problem = carray(method_, 1)[0], carray(control_, 1)[0], carray(problem_, 1)[0]
+    method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
     n, tableau = problem.states, tableau_of(method)
-    work = work_of(carray(work_, (work_rows(problem, method), n)), problem, method)
+    work = work_of(work_at(work_, problem, method), problem, method)
     in_time, increments, state = work.slopes[n], work.stages, work.stage_state
     factor(tableau.couplings[0, 0] / h, work.slopes, work.matrix, work.pivots)
     for stage in range(method.stages):
@@ -144,7 +144,7 @@ def step(t, h, method_, work_, control_, problem_):
         solve(work.matrix, work.pivots, own)
     for i in range(n):
         work.new_state[i] = state[i] + own[i]
-    judge(own, work, control)
+    judge(own, work, carray(control_, 1)[0])
 
 
 @callback(*BETWEEN)
@@ -152,7 +152,7 @@ def between(t, h, count, times_, out_, method_, work_, problem_):
     """States at times from t to t + h, of third order."""
     method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
     n, tableau = problem.states, tableau_of(method)
-    work = work_of(carray(work_, (work_rows(problem, method), n)), problem, method)
+    work = work_of(work_at(work_, problem, method), problem, method)
     times, out = carray(times_, (count,)), carray(out_, (count, n))
     for i in range(n):
         bend = twist = 0.0
@@ -162,7 +162,7 @@ def between(t, h, count, times_, out_, method_, work_, problem_):
         for row in range(count):
             part = min(1.0, (times[row] - t) / h)
             rest = 1.0 - part
-            # Written so that what rests stays exactly where it is.
+            # Written so that what rests stays exactly as it is.
             out[row, i] = work.state[i] + part * (work.new_state[i] - work.state[i] + rest * (bend + part * twist))
 
 

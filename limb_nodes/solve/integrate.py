@@ -1,7 +1,7 @@
 """Advancing states in time with step control, joint limits as events, and dense output, compiled.
 
-Two methods: explicit (`limb_nodes.solve.explicit`) where the motion sets the step, implicit
-(`limb_nodes.solve.implicit`) where stiff muscles or light segments would.
+Two methods: explicit (`limb_nodes.solve.explicit`) if the motion sets the step, implicit
+(`limb_nodes.solve.implicit`) if stiff muscles or light segments would.
 """
 
 from __future__ import annotations
@@ -14,7 +14,15 @@ from numba import njit, types
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.limits import NOTHING
 from limb_nodes.solve.pointer import f8, invoke
-from limb_nodes.solve.problem import Control, Method, Problem, evaluate, take_step, work_of, work_rows
+from limb_nodes.solve.problem import (
+    control_type,
+    evaluate,
+    method_type,
+    problem_type,
+    take_step,
+    work_of,
+    work_rows,
+)
 
 vector, table = f8[::1], f8[:, ::1]
 
@@ -30,7 +38,7 @@ def copy(source, target):
         target[i] = source[i]
 
 
-@njit(types.void(Problem, vector, vector, table), cache=True, error_model="numpy")
+@njit(types.void(problem_type, vector, vector, table), cache=True, error_model="numpy")
 def difference_slopes(problem, y, scale, out):
     """Slopes of the rates at time 0, out [states, states], by central differences. scale: typical sizes [states]."""
     n = y.size
@@ -74,7 +82,7 @@ def fill(t, h, row, times, out, method, rows, problem):
 
 
 @njit(
-    types.int64(Method, Problem, Control, vector, vector, vector, vector, table),
+    types.int64(method_type, problem_type, control_type, vector, vector, vector, vector, table),
     cache=True,
     error_model="numpy",
     nogil=True,

@@ -19,8 +19,8 @@ from limb_nodes.solve.problem import (
     method_pointer,
     problem_pointer,
     take_step,
+    work_at,
     work_of,
-    work_rows,
 )
 
 # What happens at the end of a step.
@@ -229,7 +229,7 @@ def limits_and_locked(problem):
 def settle(t, method_, work_, problem_):
     """Lock the joints that start on a limit and press against it, and stop those that move there."""
     method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
-    work = work_of(carray(work_, (work_rows(problem, method), problem.states)), problem, method)
+    work = work_of(work_at(work_, problem, method), problem, method)
     limits, locked = limits_and_locked(problem)
     lock_touching(t, work, problem, limits, locked)
     for j in range(problem.joints):
@@ -246,12 +246,12 @@ def find_event(t, h, method_, work_, control_, problem_):
     Until the time `control.quiet_until` no joint is released.
     """
     method, control, problem = carray(method_, 1)[0], carray(control_, 1)[0], carray(problem_, 1)[0]
-    rows, joints = carray(work_, (work_rows(problem, method), problem.states)), problem.joints
+    rows, joints = work_at(work_, problem, method), problem.joints
     work = work_of(rows, problem, method)
     limits, locked = limits_and_locked(problem)
     part = turning_point(work.state, work.new_state, limits, joints, locked, h)
     if part > 0.0:
-        # The ends of a step do not tell of a touch in between: look where the joint turns.
+        # The ends of a step do not tell of a touch in between: look at the place at which the joint turns.
         take_step(t, part * h, method, rows, control, problem)
         if overshoot(work.new_state, limits, joints, locked)[1] > TOUCH:
             h = part * h
@@ -274,8 +274,9 @@ def find_event(t, h, method_, work_, control_, problem_):
 @callback(f8, method_pointer, numbers, control_pointer, problem_pointer)
 def take_effect(t, method_, work_, control_, problem_):
     """What an event does to the state: an impact stops its joint and jolts the others."""
-    method, control, problem = carray(method_, 1)[0], carray(control_, 1)[0], carray(problem_, 1)[0]
-    work = work_of(carray(work_, (work_rows(problem, method), problem.states)), problem, method)
+    method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
+    work = work_of(work_at(work_, problem, method), problem, method)
+    control = carray(control_, 1)[0]
     limits, locked = limits_and_locked(problem)
     joint, state = control.joint, work.state
     if control.event == RELEASE:

@@ -1,4 +1,4 @@
-"""Sampled inputs as cubic pieces: smooth where the input is, with corners where it has them.
+"""Sampled inputs as cubic pieces: smooth if the input is, with the corners that it has.
 
 A table of pieces holds, for every interval between two samples, four numbers per input: the
 coefficients of the powers 0 to 3 of the part of the interval that has passed.
@@ -22,34 +22,34 @@ STEEPEST_BEND = 1e-2
 @njit(cache=True)
 def straight(before, after):
     """One interval [1, 4 n] of straight lines between two samples [n]."""
-    found = np.zeros((1, 4 * before.size))
+    piece = np.zeros((1, 4 * before.size))
     for j in range(before.size):
-        found[0, 4 * j] = before[j]
-        found[0, 4 * j + 1] = after[j] - before[j]
-    return found
+        piece[0, 4 * j] = before[j]
+        piece[0, 4 * j + 1] = after[j] - before[j]
+    return piece
 
 
 @njit(cache=True)
 def bent(earlier, before, after):
     """One interval [1, 4 n] between the last two of three samples [n]: a parabola through all three.
 
-    Beside a corner, where the three say nothing of the curvature, it is straight.
+    Beside a corner it is straight: there the three say nothing of the curvature.
     """
-    found = np.zeros((1, 4 * before.size))
+    piece = np.zeros((1, 4 * before.size))
     for j in range(before.size):
         bend = after[j] - 2.0 * before[j] + earlier[j]
         if abs(bend) > STEEPEST_BEND:
             bend = 0.0
-        found[0, 4 * j] = before[j]
-        found[0, 4 * j + 1] = after[j] - before[j] - 0.5 * bend
-        found[0, 4 * j + 2] = 0.5 * bend
-    return found
+        piece[0, 4 * j] = before[j]
+        piece[0, 4 * j + 1] = after[j] - before[j] - 0.5 * bend
+        piece[0, 4 * j + 2] = 0.5 * bend
+    return piece
 
 
 def corners(samples: FloatArray) -> BoolArray:
     """Whether each sample [T, n] is a corner [T, n]."""
     count, width = samples.shape
-    found = np.zeros(samples.size, dtype=np.bool_)
+    corner = np.zeros(samples.size, dtype=np.bool_)
     if count > 2:
         flat = samples.reshape(-1)
         # Of all samples, and of two before and behind them: nothing is known of the bends there.
@@ -59,8 +59,8 @@ def corners(samples: FloatArray) -> BoolArray:
         np.abs(own, out=own)
         sharp = np.flatnonzero(own > LEAST_CORNER) + 3 * width
         beside = np.maximum(bends[sharp - 2 * width], bends[sharp + 2 * width])
-        found[sharp - 2 * width] = bends[sharp] > CORNER_RATIO * beside
-    return found.reshape(count, width)
+        corner[sharp - 2 * width] = bends[sharp] > CORNER_RATIO * beside
+    return corner.reshape(count, width)
 
 
 def slopes_of(samples: FloatArray, corner: BoolArray) -> FloatArray:
@@ -96,7 +96,7 @@ def cubics(samples, n, slopes, corner, table):
     for at in range(samples.size - n):
         rise = samples[at + n] - samples[at]
         # Beside a corner the straight line is the honest guess for the side that the corner hides,
-        # and where an input rests on a bound, a cubic must not swing past it.
+        # and if an input rests on a bound, a cubic must not swing past it.
         start = rise if corner[at] or rise == 0.0 else slopes[at]
         end = rise if corner[at + n] or rise == 0.0 else slopes[at + n]
         table[4 * at] = samples[at]
@@ -108,7 +108,7 @@ def cubics(samples, n, slopes, corner, table):
 def pieces(samples: FloatArray, sharp: BoolArray | None = None) -> FloatArray:
     """Table [T - 1, 4 n] of pieces through samples [T, n]; one sample is held.
 
-    sharp: their `corners`, where they are known.
+    sharp: their `corners`, if they are known.
     """
     count, width = samples.shape
     if count == 1:

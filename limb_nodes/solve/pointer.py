@@ -43,7 +43,7 @@ def callback(*arguments: Any) -> Callable[[Callable[..., None]], Callback]:
 
 @intrinsic
 def invoke(typingctx, address, *arguments):
-    """Call the function at `address` with numbers, and for each array or record with where its numbers are."""
+    """Call the function at `address` with numbers, and with the address of the numbers of each array or record."""
     signature = types.none(address, types.StarArgTuple(arguments))
 
     def generate(context, builder, signature, given):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import from_dtype, types
+from numba import carray, from_dtype, types
 
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.records import Record, new_record, whole_numbers
@@ -45,7 +45,7 @@ METHOD = whole_numbers("step", "between", "tableau", "stages", "implicit", "sett
 # Given: start, end: s. tolerance: of a step's error, relative to a state's size. longest: greatest step (s).
 # Given and told: next_step: size of the step that comes next (s), chosen by the integrator if 0.
 # Told: time: reached (s). error: of the last step over its tolerance. steps, rejected: how many. event, joint:
-# what ended the last step, and where. quiet_until: until then no joint is released (s).
+# what ended the last step, and which joint. quiet_until: until then no joint is released (s).
 CONTROL = np.dtype(
     [
         *((name, np.float64) for name in ("start", "end", "tolerance", "longest")),
@@ -54,14 +54,16 @@ CONTROL = np.dtype(
     ]
 )
 
-Problem, Method, Control = (from_dtype(kind) for kind in (PROBLEM, METHOD, CONTROL))
-problem_pointer, method_pointer, control_pointer = (types.CPointer(kind) for kind in (Problem, Method, Control))
+problem_type, method_type, control_type = (from_dtype(kind) for kind in (PROBLEM, METHOD, CONTROL))
+problem_pointer, method_pointer, control_pointer = (
+    types.CPointer(kind) for kind in (problem_type, method_type, control_type)
+)
 
 
 class Work(NamedTuple):
     """The arrays of a step of n states, views of one array.
 
-    state, new_state: [n], at its start and its end. stage_state: [n], where the rates are asked for.
+    state, new_state: [n], at its start and its end. stage_state: [n], for which the rates are asked.
     scale: [n], typical sizes. start_rates: [n], at its start. stages: [stages, n], rates or increments.
     slopes: [n + 1, n], as the problem's jacobian gives them at its start; matrix: [n, n] and pivots: [n], factors
     that are made of them; these three only of an implicit method.
@@ -100,6 +102,12 @@ def work_of(rows, problem, method):
         rows[matrix : matrix + n],
         rows[matrix + n * method.implicit],
     )
+
+
+@inner
+def work_at(pointer, problem, method):
+    """The array of `Work` at a pointer."""
+    return carray(pointer, (work_rows(problem, method), problem.states))
 
 
 @inner

@@ -115,7 +115,7 @@ class MuscleStepper:
         out = np.empty((4, self.joints))
         model = self.model
         model.program.torque_slopes(
-            self._state, interval(last_drive, drive, next_drive), model.layout.model, self._data, out
+            self._state, tick_input(last_drive, drive, next_drive), model.layout.model, self._data, out
         )
         return out
 
@@ -147,7 +147,7 @@ class MuscleStepper:
             before,
             after,
         )
-        inputs = interval(last_drive, drive, next_drive)
+        inputs = tick_input(last_drive, drive, next_drive)
         give_inputs(self._problem, inputs)
         set_tick(self._control, period)
         scale, states = self.model.layout.state_scales, self.internal
@@ -245,7 +245,7 @@ class LimbStepper:
             self._predicted = NO_TIMES
 
 
-def interval(last_drive: FloatArray | None, drive: FloatArray, next_drive: FloatArray) -> FloatArray:
+def tick_input(last_drive: FloatArray | None, drive: FloatArray, next_drive: FloatArray) -> FloatArray:
     """The input over one tick."""
     piece: FloatArray = straight(drive, next_drive) if last_drive is None else bent(last_drive, drive, next_drive)
     return piece

@@ -1,7 +1,7 @@
 """Functions of one number as tables of polynomials.
 
 A table holds what a limb's laws give over a range of one variable: smooth pieces between the places
-where a law jumps or has a corner, which are found by bisection, each split until its polynomial is
+at which a law jumps or has a corner, which bisection tells, each split until its polynomial is
 as good as the laws themselves. Where that fails, the coefficients are NaN and the laws must be asked.
 
 The functions are those of a problem (`limb_nodes.solve.problem`), called as its rates: the variable in place of the
@@ -11,7 +11,6 @@ time, the number of its owner in place of the state, values in the result.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -34,24 +33,10 @@ _TO_POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))
 _CHECKS = np.array([-0.998, -0.29, 0.1, 0.67, 0.998])
 
 
-class Wanted(NamedTuple):
-    """Which values of a function are wanted, and where.
-
-    values: the first, and the one behind the last. span: lowest and highest of the variable. scale: [values], their
-    typical sizes; errors stay below tolerance * scale.
-    """
-
-    values: tuple[int, int]
-    span: tuple[float, float]
-    scale: FloatArray
-    tolerance: float
-
-
 @inner
-def piece(problem, owner, wanted, left, right, scratch, coefficients):
+def piece(problem, owner, values, left, right, scale, scratch, coefficients):
     """Fill coefficients [values, NODES], powers of -1 to 1 across the piece; the largest error over its scale."""
-    first = wanted.values[0]
-    width = wanted.values[1] - first
+    first, width = values[0], values[1] - values[0]
     middle, half = 0.5 * (left + right), 0.5 * (right - left)
     for j in range(width):
         for power in range(NODES):
@@ -68,27 +53,27 @@ def piece(problem, owner, wanted, left, right, scratch, coefficients):
             value = coefficients[j, NODES - 1]
             for power in range(NODES - 2, -1, -1):
                 value = value * s + coefficients[j, power]
-            error = abs(value - scratch[first + j]) / wanted.scale[j]
+            error = abs(value - scratch[first + j]) / scale[j]
             if not error <= worst:
                 worst = error
     return worst
 
 
 @inner
-def corner(problem, owner, wanted, left, right, scratch):
-    """The place between left and right where values jump or bend most, to the next number."""
-    first, last = wanted.values
-    values = np.empty((5, last - first))
+def corner(problem, owner, values, left, right, scale, scratch):
+    """The place between left and right at which values jump or bend most, to the next number."""
+    first, last = values
+    seen = np.empty((5, last - first))
     while True:
         step = 0.25 * (right - left)
         for i in range(5):
             evaluate(problem.rates, left + i * step, owner, problem, scratch)
             for j in range(last - first):
-                values[i, j] = scratch[first + j]
+                seen[i, j] = scratch[first + j]
         before = after = 0.0
         for j in range(last - first):
-            before = max(before, abs(values[0, j] - 2.0 * values[1, j] + values[2, j]) / wanted.scale[j])
-            after = max(after, abs(values[2, j] - 2.0 * values[3, j] + values[4, j]) / wanted.scale[j])
+            before = max(before, abs(seen[0, j] - 2.0 * seen[1, j] + seen[2, j]) / scale[j])
+            after = max(after, abs(seen[2, j] - 2.0 * seen[3, j] + seen[4, j]) / scale[j])
         middle = left + 2.0 * step
         if middle <= left or middle >= right:
             return right
@@ -99,9 +84,10 @@ def corner(problem, owner, wanted, left, right, scratch):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def find_corners(problem, owners, wanted, scratch, coefficients, places):
-    """Fill places with those in the span where values of an owner jump or bend; how many there are."""
-    low, high = wanted.span
+def find_corners(problem, owners, values, span, scale, places):
+    """Fill places with those in the span at which values of an owner jump or bend; how many there are."""
+    low, high = span
+    scratch, coefficients = np.empty(problem.states), np.empty((scale.size, NODES))
     owner = np.zeros(1)
     count = 0
     for number in owners:
@@ -111,13 +97,13 @@ def find_corners(problem, owners, wanted, scratch, coefficients, places):
         while level >= 0:
             size = (high - low) / (1 << level)
             left, right = low + at * size, low + (at + 1) * size
-            error = piece(problem, owner, wanted, left, right, scratch, coefficients)
+            error = piece(problem, owner, values, left, right, scale, scratch, coefficients)
             smooth = error <= TOLERANCE
             if not smooth and level < SEARCH_DEPTH:
                 level, at = level + 1, 2 * at
                 continue
             if not smooth and count < places.size:
-                places[count] = corner(problem, owner, wanted, left, right, scratch)
+                places[count] = corner(problem, owner, values, left, right, scale, scratch)
                 count += 1
             while level >= 0 and at % 2 == 1:
                 level, at = level - 1, at // 2
@@ -126,25 +112,25 @@ def find_corners(problem, owners, wanted, scratch, coefficients, places):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def fit(problem, number, breaks, wanted, scratch, edges, table):
+def fit(problem, number, breaks, values, scale, tolerance, edges, table):
     """Fill edges [pieces + 1] and table [pieces, values, NODES] between breaks; how many pieces there are.
 
     The coefficients are NaN if no polynomial will do.
     """
-    owner = np.full(1, float(number))
+    owner, scratch = np.full(1, float(number)), np.empty(problem.states)
     least = LEAST_WIDTH * (breaks[-1] - breaks[0])
     pieces = 0
     for at in range(breaks.size - 1):
         left, end = breaks[at], breaks[at + 1]
         right = end
         while left < end:
-            error = piece(problem, owner, wanted, left, right, scratch, table[pieces])
-            if not error <= wanted.tolerance:
+            error = piece(problem, owner, values, left, right, scale, scratch, table[pieces])
+            if not error <= tolerance:
                 # Pieces are halved from the left; the rest is tried whole again.
                 if right - left > least and pieces < len(table) - breaks.size:
                     right = 0.5 * (left + right)
                     continue
-                for j in range(wanted.scale.size):
+                for j in range(scale.size):
                     table[pieces, j, 0] = np.nan
             edges[pieces] = left
             pieces += 1
@@ -175,18 +161,25 @@ class Table:
     starts: IntArray
 
 
-def tabulate(problem: Record, owner: int, searched: tuple[Record, IntArray], wanted: Wanted) -> Table:
-    """The table of an owner's values.
+def tabulate(
+    problem: Record,
+    owner: int,
+    searched: tuple[Record, IntArray],
+    values: tuple[int, int],
+    span: tuple[float, float],
+    scale: FloatArray,
+    tolerance: float,
+) -> Table:
+    """The table of some of an owner's values over a span of the variable.
 
-    searched: another problem and its owners, whose corners are those of the values.
+    searched: another problem and its owners, whose corners are those of the values. values: the first, and the one
+    behind the last. scale: [values], their typical sizes; errors stay below tolerance * scale.
     """
-    width = wanted.scale.size
-    scratch, coefficients = np.zeros(problem.states), np.empty((width, NODES))
     places = np.empty(MOST_PIECES // 2)
-    count = find_corners(*searched, wanted, scratch, coefficients, places)
-    breaks = np.unique(np.concatenate([wanted.span, places[:count]]))
-    edges, table = np.empty(MOST_PIECES + 1), np.empty((MOST_PIECES, width, NODES))
-    pieces = fit(problem, owner, breaks, wanted, scratch, edges, table)
+    count = find_corners(*searched, values, span, scale, places)
+    breaks = np.unique(np.concatenate([span, places[:count]]))
+    edges, table = np.empty(MOST_PIECES + 1), np.empty((MOST_PIECES, scale.size, NODES))
+    pieces = fit(problem, owner, breaks, values, scale, tolerance, edges, table)
     edges = edges[: pieces + 1].copy()
     starts = np.empty(BUCKETS, dtype=np.int64)
     first_pieces(edges, starts)

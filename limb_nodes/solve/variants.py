@@ -1,7 +1,7 @@
 """The limb of a sample: one limb's program with other numbers.
 
 Building a limb anew from its content takes as long as solving some of its seconds. Where a place
-such as ``muscles[0].tendon.stiffness`` only puts its number somewhere, that is found once, by
+such as ``muscles[0].tendon.stiffness`` only puts its number into one place, that place is looked up once, by
 building the limb with two values of it; from then on the number goes there directly.
 """
 
@@ -31,14 +31,14 @@ LIMB_PARAMETERS = {parameter.name: parameter for parameter in (BASE_ANGLE, TIP_T
 UNIT_PARAMETERS = {parameter.name: parameter for parameter in motor_unit.PARAMETERS}
 # Numbers that a limb's checks compare with others of the same unit.
 COMPARED = {"minimum_frequency", "maximum_frequency", "myosin_length", "actin_length"}
-# A program is made by one thread at a time.
+# A program is compiled by one thread at a time.
 BUILDING = Lock()
 # Numbers of a unit on which the check of a muscle's lengths depends.
 LENGTHS = {"series_sarcomeres"}
 
 
 class Slot(NamedTuple):
-    """Where a number of a limb is kept; -1 and "" where an owner has no such index or process."""
+    """Where a number of a limb is kept; -1 and "" if an owner has no such index or process."""
 
     kind: str
     owner: int
@@ -90,17 +90,17 @@ class Variants:
         self._slots: dict[str, Slots | None] = {}
 
     def model(self, values: Values) -> WholeModel:
-        """The model of a sample. Raises UserError, one line, where a value is not allowed."""
+        """The model of a sample. Raises UserError, one line, if a value is not allowed."""
         values = {place: value.item() if isinstance(value, np.generic) else value for place, value in values.items()}
-        found = [(place, value, self.slots(place, value)) for place, value in values.items()]
-        slots = [slot for _, _, direct in found for slot, _ in direct or ()]
-        if any(direct is None for _, _, direct in found) or len(set(slots)) < len(slots):
+        given = [(place, value, self.slots(place, value)) for place, value in values.items()]
+        slots = [slot for _, _, direct in given for slot, _ in direct or ()]
+        if any(direct is None for _, _, direct in given) or len(set(slots)) < len(slots):
             return self.adopted(with_values(self.limb, values))
-        for place, value, direct in found:
+        for place, value, direct in given:
             for _, parameter in direct or ():
                 if not parameter.accepts(value):
                     raise UserError(f"{self.limb.file}: {place} is {value}; {parameter.allowed()} is needed")
-        changes = {slot: float(value) for _, value, direct in found for slot, _ in direct or ()}
+        changes = {slot: float(value) for _, value, direct in given for slot, _ in direct or ()}
         limb = changed(self.limb, changes)
         if any(slot.kind not in ("limb", "segment") for slot in changes):
             return self.adopted(limb)
@@ -122,7 +122,7 @@ class Variants:
         return bool(np.array_equal(new[self.driving], old[self.driving]))
 
     def slots(self, place: str, value: Any) -> Slots | None:
-        """Where the number of a place goes; None where more than that happens to it."""
+        """Where the number of a place goes; None if more than that happens to it."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             return None
         if place not in self._slots:
@@ -135,24 +135,24 @@ class Variants:
 
 
 def direct_slots(limb: Limb, place: str, value: float) -> Slots | None:
-    """The slots that hold just the number of a place, or None where others change too."""
+    """The slots that hold just the number of a place, or None if others change too."""
     near = value * (1.0 + 1e-7) + (1e-9 if value == 0.0 else 0.0)
     first = {slot: number for slot, number, _ in numbers(with_values(limb, {place: value}))}
     other = {slot: (number, parameter) for slot, number, parameter in numbers(with_values(limb, {place: near}))}
     if first.keys() != other.keys():
         return None
-    found: Slots = []
+    direct: Slots = []
     for slot, (number, parameter) in other.items():
         if number == first[slot]:
             continue
         if (first[slot], number) != (value, near) or parameter is None or slot.name in COMPARED:
             return None
-        found.append((slot, parameter))
-    return found or None
+        direct.append((slot, parameter))
+    return direct or None
 
 
 def changed(limb: Limb, changes: dict[Slot, float]) -> Limb:
-    """A limb with other numbers in some slots. Raises UserError where a muscle cannot work so."""
+    """A limb with other numbers in some slots. Raises UserError if a muscle cannot work so."""
     owned: dict[str, dict[int, list[tuple[Slot, float]]]] = {"limb": {}, "segment": {}, "muscle": {}}
     for slot, value in changes.items():
         kind = "muscle" if slot.kind in ("law", "unit", "unit_law") else slot.kind
