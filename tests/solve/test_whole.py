@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from limb_nodes import solve
 from limb_nodes.model import layout
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import pieces, straight
@@ -278,3 +279,15 @@ def test_accelerations_are_those_of_the_motion(model_named, sine_cosine):
     # But where a unit starts to fire, the acceleration jumps.
     smooth = bend < np.quantile(bend, 0.95)
     np.testing.assert_allclose(rise[smooth], middle[smooth], atol=0.02 * np.abs(middle).max())
+
+
+@pytest.mark.parametrize("name", LIMBS)
+def test_every_function_of_a_program_is_called(name, model_named):
+    """What no limb calls is not generated: a function is named a second time, or is an entry for other modules."""
+    text = Path(model_named(name).program.__file__).read_text()
+    entries = set(re.findall(r"@(?:entry|callback\(\*ARGUMENTS\))\ndef (\w+)", text))
+    functions = re.findall(r"^def (\w+)", text, flags=re.MULTILINE)
+    assert len(functions) > 40
+    assert [one for one in functions if one not in entries and len(re.findall(rf"\b{one}\b", text)) < 2] == []
+    used = "".join(path.read_text() for path in Path(solve.__file__).parent.glob("*.py"))
+    assert [one for one in entries if not re.search(rf"program\.{one}\b", used) and f"    {one}(" not in text] == []
