@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.text_table import aligned
 from limb_nodes.solve.bench import BenchRecord
 
 # Unit of every output in the CSV file.
@@ -61,8 +62,7 @@ def summary(record: BenchRecord) -> list[Row]:
     rows: list[Row] = []
 
     def add(name: str, unit: str, values: FloatArray, scale: float = 1.0) -> None:
-        shown = values * scale
-        rows.append(Row(name, unit, *(float(v) for v in (shown[0], shown.min(), shown.max(), shown[-1]))))
+        rows.append(Row(name, unit, **extent(values * scale)))
 
     muscle = record.muscle
     add("excitation", "1", record.excitation)
@@ -82,30 +82,25 @@ def summary(record: BenchRecord) -> list[Row]:
     return rows
 
 
-def text(record: BenchRecord) -> str:
+def extent(values: FloatArray) -> dict[str, float]:
+    """First, lowest, highest and last of some values."""
+    ends = {"first": values[0], "lowest": values.min(), "highest": values.max(), "last": values[-1]}
+    return {name: float(value) for name, value in ends.items()}
+
+
+def summary_text(record: BenchRecord) -> str:
     """The summary for the terminal."""
-    rows = summary(record)
-    width = max(len(row.name) for row in rows)
-    lines = [f"{'':{width}} {'unit':>5} {'first':>10} {'lowest':>10} {'highest':>10} {'last':>10}"]
-    for row in rows:
-        numbers = " ".join(f"{value:10.5g}" for value in (row.first, row.lowest, row.highest, row.last))
-        lines.append(f"{row.name:{width}} {row.unit:>5} {numbers}")
+    rows = [("", "unit", "first", "lowest", "highest", "last")]
+    for row in summary(record):
+        first, lowest, highest, last = (f"{value:.5g}" for value in (row.first, row.lowest, row.highest, row.last))
+        rows.append((row.name, row.unit, first, lowest, highest, last))
     peak = int(record.force.argmax())
-    lines.append(f"highest force {record.force[peak]:.5g} N at {record.time[peak]:.4g} s; work {record.work:.5g} J")
-    return "\n".join(lines)
+    end = f"highest force {record.force[peak]:.5g} N at {record.time[peak]:.4g} s; work {record.work:.5g} J"
+    return "\n".join([*aligned(rows, "lrrrrr"), end])
 
 
-def plain(record: BenchRecord) -> dict[str, Any]:
+def summary_data(record: BenchRecord) -> dict[str, Any]:
     """The summary as plain data in SI units: lowest, highest, first and last of every output."""
-
-    def extent(values: FloatArray) -> dict[str, float]:
-        return {
-            "first": float(values[0]),
-            "lowest": float(values.min()),
-            "highest": float(values.max()),
-            "last": float(values[-1]),
-        }
-
     return {
         "duration": float(record.time[-1] - record.time[0]),
         "work": record.work,

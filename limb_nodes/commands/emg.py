@@ -8,6 +8,7 @@ from pathlib import Path
 
 from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.errors import FieldError
+from limb_nodes.foundation.text_table import aligned
 from limb_nodes.signals.emg import EnvelopeOptions, Envelopes, envelopes, write_envelopes
 from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
 from limb_nodes.signals.recording import RAW_TOPIC, read_recording
@@ -103,9 +104,7 @@ def summary(result: Envelopes, out: str) -> str:
         rows.append(
             (angle.column, f"{angle.name} (angle)", samples, _gaps(angle.gaps), _longest(angle.gaps), "", "", "")
         )
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    lines += [f"note: {note}" for note in result.notes]
+    lines = aligned(rows) + [f"note: {note}" for note in result.notes]
     lines.append(f"rate {result.rate:g} Hz, {(len(result.values) - 1) / result.rate:g} s, in {out}")
     return "\n".join(lines)
 

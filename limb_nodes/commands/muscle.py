@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
     excitation = np.interp(time, regular, activation.values[:, 0])
     record = bench.run(time, length, excitation, rate, initial=args.initial)
 
-    from limb_nodes.analysis.bench_table import plain, text, write_csv
+    from limb_nodes.analysis.bench_table import summary_data, summary_text, write_csv
 
     if picture:
         from limb_nodes.analysis.bench_picture import draw_bench
@@ -114,12 +114,12 @@ def run(args: argparse.Namespace) -> int:
             write_csv(record, table)
     if args.json:
         head = {"limb": limb.name, "limb_file": limb.file, "muscle": args.muscle, "notes": list(activation.notes)}
-        print(json.dumps({**head, **plain(record)}, indent=1))
+        print(json.dumps({**head, **summary_data(record)}, indent=1))
         return 0
     print(f"{args.muscle} of {limb.name}, {activation.duration:g} s")
     for note in activation.notes:
         print(f"note: {note}")
-    print(text(record))
+    print(summary_text(record))
     for name, path in (("picture", picture), ("table", table)):
         if path:
             print(f"{name}: {path}")

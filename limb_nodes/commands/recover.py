@@ -20,11 +20,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Recover, and print what the new bag holds."""
     from limb_nodes.bags.recover import recover
+    from limb_nodes.foundation.text_table import aligned
 
     recovered = recover(args.bag, args.out)
-    width = max(len(topic) for topic in recovered.counts)
-    for topic, count in sorted(recovered.counts.items()):
-        print(f"{topic.ljust(width)}  {count} message{'s' if count != 1 else ''}")
+    rows = [(topic, f"{count} message{'s' if count != 1 else ''}") for topic, count in sorted(recovered.counts.items())]
+    print("\n".join(aligned(rows)))
     if recovered.truncated:
         print("the file is damaged or ends within a record; what came after that place is lost")
     else:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.foundation.text_table import aligned
 
 
 def add_parser(subparsers: Any) -> None:
@@ -58,10 +59,11 @@ def run(args: argparse.Namespace) -> int:
     for note in activation.notes:
         print(f"note       {note}")
     print(f"solved     {activation.duration:g} s in {seconds:.3g} s, {movement.steps[0]} steps")
-    print(f"{'joint':10} {'lowest':>9} {'highest':>9} {'at the end':>11}  degrees")
+    rows = [("joint", "lowest", "highest", "at the end", "degrees")]
     for index, joint in enumerate(limb.joint_names):
         angle = [math.degrees(value) for value in movement.angle[:, index]]
-        print(f"{joint:10} {min(angle):9.3f} {max(angle):9.3f} {angle[-1]:11.4f}")
+        rows.append((joint, f"{min(angle):.3f}", f"{max(angle):.3f}", f"{angle[-1]:.4f}", ""))
+    print("\n".join(aligned(rows, "lrrr")))
     if args.out:
         from limb_nodes.analysis.record import write_movement
         from limb_nodes.bags.versions import versions

@@ -8,7 +8,7 @@ import shutil
 import sys
 
 from limb_nodes.analysis.structure import TITLES, analyse
-from limb_nodes.analysis.structure.plain import plain
+from limb_nodes.analysis.structure.data import structure_data
 from limb_nodes.analysis.structure.table import report
 from limb_nodes.analysis.style import SUFFIXES
 from limb_nodes.commands import output_file, writing
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         with writing("out"):
             draw_structure(findings, limb.name, out)
     if args.json:
-        text = json.dumps(plain(findings, limb.name, args.limb), indent=1)
+        text = json.dumps(structure_data(findings, limb.name, args.limb), indent=1)
     else:
         text = report(findings, limb.name, max(60, shutil.get_terminal_size((110, 24)).columns), bool(args.level))
         if out:

@@ -11,11 +11,13 @@ import signal
 import sys
 import tempfile
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from limb_nodes.commands import writing
 from limb_nodes.errors import FieldError
+from limb_nodes.foundation.text_table import aligned
 
 if TYPE_CHECKING:
     from limb_nodes.analysis.trajectory import Trajectory
@@ -161,20 +163,20 @@ def write_activation(case: Case, limb: Limb, path: Path) -> None:
 
 
 def table(cases: Sequence[Case], ways: Sequence[str], findings: Sequence[Finding]) -> str:
-    """Expected, found, tolerance and verdict of every quantity."""
-    by_name = {(f.case.name, f.quantity.name, f.solver): f for f in findings}
-    width = max(len(quantity.name) for case in cases for quantity in case.quantities)
-    head = f"  {'quantity':{width}} {'expected':>12}" + "".join(f" {way:>12}" for way in ways)
-    lines = [f"{head} {'tolerance':>10}  verdict"]
+    """Expected and measured value, tolerance and verdict of every quantity."""
+    by_key = {(finding.case.name, finding.quantity.name, finding.solver): finding for finding in findings}
+    rows = [("  quantity", "expected", *ways, "tolerance", "verdict")]
     for case in cases:
-        lines.append(f"case {case.name}: {case.set_up}")
         for quantity in case.quantities:
-            of = [by_name[case.name, quantity.name, way] for way in ways]
-            values = "".join(f" {number(finding.found):>12}" for finding in of)
+            of = [by_key[case.name, quantity.name, way] for way in ways]
             failed = [finding.solver for finding in of if not finding.passed]
             verdict = f"FAILED ({', '.join(failed)})" if failed else "passed"
-            row = f"  {quantity.name:{width}} {number(quantity.expected):>12}{values} {quantity.tolerance:>10.2g}"
-            lines.append(f"{row}  {verdict}")
+            numbers = [number(value) for value in (quantity.expected, *(finding.found for finding in of))]
+            rows.append((f"  {quantity.name}", *numbers, f"{quantity.tolerance:.2g}", verdict))
+    head, *texts = aligned(rows, "l" + "r" * (len(ways) + 2))
+    lines, rest = [head], iter(texts)
+    for case in cases:
+        lines += [f"case {case.name}: {case.set_up}", *islice(rest, len(case.quantities))]
     bad = sum(not finding.passed for finding in findings)
     lines.append(f"{len(findings) - bad} of {len(findings)} passed" + (f", {bad} FAILED" if bad else ""))
     return "\n".join(lines)

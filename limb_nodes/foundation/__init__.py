@@ -1,1 +1,1 @@
-"""What everything else stands on: types of arrays, declared parameters, sections of YAML files."""
+"""What everything else stands on: types of arrays, declared parameters, sections of YAML files, text tables."""

@@ -10,6 +10,7 @@ from limb_nodes.analysis.structure.levels import ASSEMBLED, MODEL
 from limb_nodes.analysis.structure.matrix import MARKS, Matrix, structure_matrix
 from limb_nodes.analysis.structure.relations import Relation, Variable
 from limb_nodes.analysis.structure.symbols import symbol
+from limb_nodes.foundation.text_table import aligned
 
 TIMES = {1: "once", 2: "twice"}
 # Laws that tell the levels of one name apart, where they are many.
@@ -19,6 +20,8 @@ KINDS = {
     "differential and algebraic equations": "DAE",
     "ordinary differential equations": "ODE",
 }
+# Of the summary: a level, five counts, kind and laws.
+COLUMNS = "lrrrrrll"
 MEMBERS = 12
 LONGEST_LIST = 12
 PRIME = "'"
@@ -64,24 +67,12 @@ def summary(findings: Iterable[Findings], width: int) -> list[str]:
                 ", ".join(laws),
             )
         )
-    start = len(columns([(*row[:-1], "|") for row in rows], right=(1, 2, 3, 4, 5))[0]) - 1
+    start = len(aligned([(*row[:-1], "|") for row in rows], COLUMNS)[0]) - 1
     lines: list[str] = []
-    for line in columns(rows, right=(1, 2, 3, 4, 5)):
+    for line in aligned(rows, COLUMNS):
         first, *more = wrapped(line[start:], max(24, width - start), "")
         lines += [line[:start] + first, *(" " * start + text for text in more)]
     return [line.rstrip() for line in lines]
-
-
-def columns(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> list[str]:
-    """Lines of a table with aligned columns."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return [
-        "  ".join(
-            cell.rjust(width) if i in right else cell.ljust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
 
 
 def level_lines(one: Findings, width: int, every_matrix: bool) -> list[str]:
@@ -222,15 +213,8 @@ def matrix_lines(matrix: Matrix, width: int) -> list[str]:
             if len(tables) > 1 and not any((row, c) in matrix.entries for c in table):
                 continue
             rows.append([row_heading(row), *(marks.get((row, c), "·") for c in table)])
-        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
         lines += [""] if number else []
-        lines += [
-            "  ".join(
-                cell.center(size) if i else cell.ljust(size)
-                for i, (cell, size) in enumerate(zip(row, widths, strict=True))
-            ).rstrip()
-            for row in rows
-        ]
+        lines += aligned(rows, "l" + "c" * len(table))
     return lines
 
 

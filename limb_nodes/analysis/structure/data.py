@@ -10,12 +10,12 @@ from limb_nodes.analysis.structure.matrix import structure_matrix
 from limb_nodes.analysis.structure.relations import Variable
 
 
-def plain(findings: Sequence[Findings], limb_name: str, file: str) -> dict[str, Any]:
+def structure_data(findings: Sequence[Findings], limb_name: str, file: str) -> dict[str, Any]:
     """All levels."""
-    return {"limb": limb_name, "file": file, "levels": [plain_level(one) for one in findings]}
+    return {"limb": limb_name, "file": file, "levels": [level_data(one) for one in findings]}
 
 
-def plain_level(one: Findings) -> dict[str, Any]:
+def level_data(one: Findings) -> dict[str, Any]:
     """One level. Equations are named by their place in the list `equations`, from 0."""
     system, offsets = one.system, one.offsets
     matrix = structure_matrix(system)
