@@ -85,9 +85,9 @@ def steady_force(velocity: float, rates: tuple[float, ...]) -> float:
         p = huxley.bond_mean(q[0], q[1])
         s = huxley.bond_deviation(q[0], q[2], p)
         return [
-            huxley.bond_moment_0_rate(q[0], p, s, *rates),
-            huxley.bond_moment_1_rate(q[0], p, s, velocity, *rates),
-            huxley.bond_moment_2_rate(q[0], q[1], p, s, velocity, *rates),
+            huxley.bond_moment_0_rate(q[0], huxley.bond_loss_0(p, s, *rates), rates[0]),
+            huxley.bond_moment_1_rate(q[0], huxley.bond_loss_1(p, s, *rates), velocity, rates[0]),
+            huxley.bond_moment_2_rate(q[0], q[1], huxley.bond_loss_2(p, s, *rates), velocity, rates[0]),
         ]
 
     # Switched on: no bonds at the start.

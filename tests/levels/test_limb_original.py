@@ -83,16 +83,15 @@ def test_the_movement_satisfies_the_balances_of_free_bodies(solved):
     for t in range(0, len(angles), 10):
         forces = joint_forces(limb, pushes[t])
         for k, segment in enumerate(limb.segments):
-            body = (segment.com_distance, segment.length, segment.inertia)
+            proximal = original.proximal_moment(angles[t, k], *forces[k], segment.com_distance)
+            end = TIP_FORCE if k == 2 else forces[k + 1]
+            distal = original.distal_moment(angles[t, k], *end, segment.com_distance, segment.length)
+            moments = (proximal, distal, segment.inertia)
             if k == 2:
-                found = original.last_segment_velocity_rate(
-                    torques[t, k], TIP_TORQUE, angles[t, k], *forces[k], *TIP_FORCE, *body
-                )
+                rate = original.last_segment_velocity_rate(torques[t, k], TIP_TORQUE, *moments)
             else:
-                found = original.segment_velocity_rate(
-                    torques[t, k], torques[t, k + 1], angles[t, k], *forces[k], *forces[k + 1], *body
-                )
-            assert found == pytest.approx(accelerations[t, k], abs=1e-9 * scale)
+                rate = original.segment_velocity_rate(torques[t, k], torques[t, k + 1], *moments)
+            assert rate == pytest.approx(accelerations[t, k], abs=1e-9 * scale)
 
 
 def test_forces_in_the_first_joint_carry_the_whole_limb(solved):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 from limb_nodes.analysis.structure.relations import Assembly, Relation, Term, Variable, relate, substitute
 from limb_nodes.levels.equation import ScalarFunction, equation_of
@@ -21,6 +22,34 @@ ABBREVIATIONS = (
     "inertia_coupling",
 )
 NONE: tuple[Term, ...] = ()
+
+
+class AxisEquations(NamedTuple):
+    """The equations of the original form along one axis."""
+
+    velocity: ScalarFunction
+    acceleration: ScalarFunction
+    force: ScalarFunction
+    last_force: ScalarFunction
+    point: ScalarFunction
+
+
+AXES = {
+    "x": AxisEquations(
+        original.com_velocity_x,
+        original.com_acceleration_x,
+        original.joint_force_x,
+        original.last_joint_force_x,
+        chain.point_x,
+    ),
+    "y": AxisEquations(
+        original.com_velocity_y,
+        original.com_acceleration_y,
+        original.joint_force_y,
+        original.last_joint_force_y,
+        chain.point_y,
+    ),
+}
 Given = Mapping[str, Iterable[Term]]
 
 
@@ -31,12 +60,12 @@ def of(owner: str, *names: str, order: int = 0) -> tuple[Term, ...]:
 
 def interface(limb: Limb, level: str) -> list[Relation]:
     """Torques of the joints by those of the muscles, joint angles and velocities by those of the segments."""
-    found = []
+    relations = []
     previous = ""
     for k, segment in enumerate(limb.segments):
         torques = tuple(Term(Variable(m.name, "muscle_torque")) for m in limb.muscles if m.joint == k)
         (torque,) = of(segment.name, "joint_torque")
-        found.append(Relation("2.61", segment.name, level, torque, torques))
+        relations.append(Relation("2.61", segment.name, level, torque, torques))
         for item, angle in (
             (original.joint_angle, "segment_angle"),
             (original.joint_velocity, "segment_velocity"),
@@ -44,9 +73,9 @@ def interface(limb: Limb, level: str) -> list[Relation]:
             equation = equation_of(item)
             (defined,) = of(segment.name, equation.defines)
             given = {angle: of(segment.name, angle), f"previous_{angle}": of(previous, angle) if k else NONE}
-            found.append(relate(equation, level, segment.name, defined, given))
+            relations.append(relate(equation, level, segment.name, defined, given))
         previous = segment.name
-    return found
+    return relations
 
 
 def original_assembly(limb: Limb) -> Assembly:
@@ -59,123 +88,142 @@ def original_assembly(limb: Limb) -> Assembly:
 
 def original_relations(limb: Limb) -> list[Relation]:
     """Every segment as a free body."""
-    relations: list[Relation] = []
-
-    def add(owner: str, function: ScalarFunction, given: Given, defines: Term | None = None) -> None:
-        item = equation_of(function)
-        target = defines or of(owner, item.defines)[0]
-        constants = dict.fromkeys(("mass", "inertia", "length", "com_distance", "gravity_x", "gravity_y"), NONE)
-        relations.append(relate(item, ORIGINAL, owner, target, {**constants, **given}))
-
     names = [segment.name for segment in limb.segments]
+    relations: list[Relation] = []
     for k, name in enumerate(names):
-        own = {
-            variable: of(name, variable)
-            for variable in ("segment_angle", "segment_velocity", "joint_torque", "joint_force_x", "joint_force_y")
-        }
-        following = names[k + 1] if k + 1 < len(names) else None
-        angle, velocity = of(name, "segment_angle", order=1)[0], of(name, "segment_velocity", order=1)[0]
-        add(name, original.segment_angle_rate, own, angle)
-        if following is None:
-            turning = {**own, **TIP_FORCE, "tip_torque": TIP_TORQUE}
-            add(name, original.last_segment_velocity_rate, turning, velocity)
-        else:
-            carried = {
-                f"next_{variable}": of(following, variable)
-                for variable in ("joint_torque", "joint_force_x", "joint_force_y")
-            }
-            add(name, original.segment_velocity_rate, {**own, **carried}, velocity)
-        for axis, speed, push, force, last_force, point in (
-            (
-                "x",
-                original.com_velocity_x,
-                original.com_acceleration_x,
-                original.joint_force_x,
-                original.last_joint_force_x,
-                chain.point_x,
-            ),
-            (
-                "y",
-                original.com_velocity_y,
-                original.com_acceleration_y,
-                original.joint_force_y,
-                original.last_joint_force_y,
-                chain.point_y,
-            ),
-        ):
-            rates = {
-                f"{variable}_{axis}_rate": of(name, f"{variable}_{axis}", order=1)
-                for variable in ("com_position", "com_velocity")
-            }
-            pulls = of(following, f"joint_force_{axis}") if following else NONE
-            given = {
-                f"com_acceleration_{axis}": of(name, f"com_acceleration_{axis}"),
-                f"next_joint_force_{axis}": pulls,
-                **TIP_FORCE,
-            }
-            add(name, speed, rates)
-            add(name, push, rates)
-            add(name, force if following else last_force, given)
-            # 2.65 sums over the segments before; the chain of joint positions is put in below.
-            place = {
-                f"origin_{axis}": of(name, f"joint_position_{axis}") if k else NONE,
-                "distance": NONE,
-                "segment_angle": of(name, "segment_angle"),
-            }
-            add(name, point, place, of(name, f"com_position_{axis}")[0])
-            if following:
-                add(name, point, place, of(following, f"joint_position_{axis}")[0])
-    return substitute(relations, ("joint_position_x", "joint_position_y"))
+        following = names[k + 1] if k + 1 < len(names) else ""
+        relations += turning(name, following)
+        for axis, equations in AXES.items():
+            relations += translation(name, following, axis, equations, based=k == 0)
+    return substitute(relations, ("joint_position_x", "joint_position_y", "proximal_moment", "distal_moment"))
+
+
+def free_body(owner: str, function: ScalarFunction, given: Given, defines: Term | None = None) -> Relation:
+    """An equation of a segment, by default of the variable that it defines."""
+    item = equation_of(function)
+    constants = dict.fromkeys(("mass", "inertia", "length", "com_distance", "gravity_x", "gravity_y"), NONE)
+    return relate(item, ORIGINAL, owner, defines or of(owner, item.defines)[0], {**constants, **given})
+
+
+def turning(name: str, following: str) -> list[Relation]:
+    """Angle and angular velocity of a segment; `following` is the segment that it carries, if any."""
+    own = {
+        variable: of(name, variable)
+        for variable in (
+            "segment_angle",
+            "segment_velocity",
+            "joint_torque",
+            "joint_force_x",
+            "joint_force_y",
+            "proximal_moment",
+            "distal_moment",
+        )
+    }
+    angle, velocity = of(name, "segment_angle", "segment_velocity", order=1)
+    if following:
+        own |= {f"distal_force_{axis}": of(following, f"joint_force_{axis}") for axis in AXES}
+        own["next_joint_torque"] = of(following, "joint_torque")
+        rate = original.segment_velocity_rate
+    else:
+        own |= {f"distal_force_{axis}": TIP_FORCE[f"tip_force_{axis}"] for axis in AXES}
+        own["tip_torque"] = TIP_TORQUE
+        rate = original.last_segment_velocity_rate
+    return [
+        free_body(name, original.segment_angle_rate, own, angle),
+        free_body(name, rate, own, velocity),
+        free_body(name, original.proximal_moment, own),
+        free_body(name, original.distal_moment, own),
+    ]
+
+
+def translation(name: str, following: str, axis: str, equations: AxisEquations, based: bool) -> list[Relation]:
+    """Movement of a segment's centre of mass along an axis, and the forces. based: whether the base holds it."""
+    given = {
+        f"{variable}_{axis}_rate": of(name, f"{variable}_{axis}", order=1)
+        for variable in ("com_position", "com_velocity")
+    }
+    given |= {
+        f"com_acceleration_{axis}": of(name, f"com_acceleration_{axis}"),
+        f"next_joint_force_{axis}": of(following, f"joint_force_{axis}") if following else NONE,
+        **TIP_FORCE,
+        # 2.65 sums over the segments before; the chain of joint positions is put in later.
+        f"origin_{axis}": NONE if based else of(name, f"joint_position_{axis}"),
+        "distance": NONE,
+        "segment_angle": of(name, "segment_angle"),
+    }
+    relations = [
+        free_body(name, equations.velocity, given),
+        free_body(name, equations.acceleration, given),
+        free_body(name, equations.force if following else equations.last_force, given),
+        free_body(name, equations.point, given, of(name, f"com_position_{axis}")[0]),
+    ]
+    if following:
+        relations.append(free_body(name, equations.point, given, of(following, f"joint_position_{axis}")[0]))
+    return relations
 
 
 def transformed_relations(limb: Limb) -> list[Relation]:
     """Segment angles and velocities alone (3.10, 3.11), with A, M, F and G put into 3.11."""
-    relations: list[Relation] = []
-
-    def add(owner: str, function: ScalarFunction, given: Given, defines: Term) -> None:
-        relations.append(relate(equation_of(function), TRANSFORMED, owner, defines, given))
-
     names = [segment.name for segment in limb.segments]
+    relations: list[Relation] = []
     for k, name in enumerate(names):
-        angle = of(name, "segment_angle")
-        add(
+        relations += torques(name, names[k + 1] if k + 1 < len(names) else "")
+        for other in names:
+            relations += coupling(name, other)
+        relations.append(balance(name, names))
+    return substitute(relations, ABBREVIATIONS)
+
+
+def transform(owner: str, function: ScalarFunction, given: Given, defines: Term | None = None) -> Relation:
+    """An equation of the transformed form, by default of the variable that it defines."""
+    item = equation_of(function)
+    constants = dict.fromkeys(("length", "first_moment", "coupling", "gravity_x", "gravity_y"), NONE)
+    return relate(item, TRANSFORMED, owner, defines or of(owner, item.defines)[0], {**constants, **given})
+
+
+def torques(name: str, following: str) -> list[Relation]:
+    """Angle of a segment, and the torques on it that no other segment's movement makes."""
+    (angle,) = of(name, "segment_angle")
+    turned = {"cosine": (angle,), "sine": (angle,), **TIP_FORCE}
+    muscles = {"joint_torque": of(name, "joint_torque"), "tip_torque": TIP_TORQUE}
+    if following:
+        muscles["next_joint_torque"] = of(following, "joint_torque")
+    return [
+        transform(
             name,
             transformed.segment_angle_rate,
             {"segment_velocity": of(name, "segment_velocity")},
             of(name, "segment_angle", order=1)[0],
-        )
-        torque = {"joint_torque": of(name, "joint_torque")}
-        (net,) = of(name, "net_torque")
-        if k + 1 < len(names):
-            following = {"next_joint_torque": of(names[k + 1], "joint_torque")}
-            add(name, transformed.net_torque, {**torque, **following}, net)
-        else:
-            add(name, transformed.last_net_torque, {**torque, "tip_torque": TIP_TORQUE}, net)
-        directions = {"cosine": angle, "sine": angle}
-        gravity = {"first_moment": NONE, "gravity_x": NONE, "gravity_y": NONE}
-        add(name, chain.gravity_torque, {**gravity, **directions}, of(name, "gravity_torque")[0])
-        tip = {"length": NONE, **TIP_FORCE, **directions}
-        add(name, chain.tip_force_torque, tip, of(name, "tip_force_torque")[0])
-        inertial, centrifugal = [], []
-        for other in names:
-            pair = f"{name}, {other}"
-            both = (*angle, *of(other, "segment_angle")) if other != name else NONE
-            coupling, motion, turn = of(pair, "inertia_coupling", "inertial_torque", "centrifugal_torque")
-            given = {"coupling": NONE, "cosine": both}
-            add(pair, chain.inertia_coupling, given, coupling)
-            given = {"inertia_coupling": (coupling,), "segment_velocity_rate": of(other, "segment_velocity", order=1)}
-            add(pair, transformed.inertial_torque, given, motion)
-            inertial.append(motion)
-            if other != name:
-                given = {"coupling": NONE, "sine": both, "segment_velocity": of(other, "segment_velocity")}
-                add(pair, chain.centrifugal_torque, given, turn)
-                centrifugal.append(turn)
-        row = {
-            "net_torque": (net,),
-            "gravity_torque": of(name, "gravity_torque"),
-            "tip_force_torque": of(name, "tip_force_torque"),
-            "inertial_torque": inertial,
-            "centrifugal_torque": centrifugal,
-        }
-        add(name, transformed.torque_residual, row, of(name, "segment_velocity", order=1)[0])
-    return substitute(relations, ABBREVIATIONS)
+        ),
+        transform(name, transformed.net_torque if following else transformed.last_net_torque, muscles),
+        transform(name, chain.gravity_torque, turned),
+        transform(name, chain.tip_force_torque, turned),
+    ]
+
+
+def coupling(name: str, other: str) -> list[Relation]:
+    """The torques on a segment by the movement of another or of its own."""
+    pair = f"{name}, {other}"
+    angles = (*of(name, "segment_angle"), *of(other, "segment_angle")) if other != name else NONE
+    given = {
+        "cosine": angles,
+        "sine": angles,
+        "inertia_coupling": of(pair, "inertia_coupling"),
+        "segment_velocity_rate": of(other, "segment_velocity", order=1),
+        "segment_velocity": of(other, "segment_velocity"),
+    }
+    relations = [transform(pair, chain.inertia_coupling, given), transform(pair, transformed.inertial_torque, given)]
+    return relations + ([transform(pair, chain.centrifugal_torque, given)] if other != name else [])
+
+
+def balance(name: str, names: Sequence[str]) -> Relation:
+    """The row of 3.11 of a segment among all."""
+    row: dict[str, tuple[Term, ...]] = {
+        variable: of(name, variable) for variable in ("net_torque", "gravity_torque", "tip_force_torque")
+    }
+    pairs = {other: f"{name}, {other}" for other in names}
+    row["inertial_torque"] = tuple(term for pair in pairs.values() for term in of(pair, "inertial_torque"))
+    row["centrifugal_torque"] = tuple(
+        term for other, pair in pairs.items() if other != name for term in of(pair, "centrifugal_torque")
+    )
+    return transform(name, transformed.torque_residual, row, of(name, "segment_velocity", order=1)[0])

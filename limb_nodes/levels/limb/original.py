@@ -24,44 +24,35 @@ def segment_angle_rate(segment_velocity: float) -> float:
     return segment_velocity
 
 
+@equation("r^1 x F_L", "proximal_moment")
+def proximal_moment(segment_angle: float, joint_force_x: float, joint_force_y: float, com_distance: float) -> float:
+    """Moment (N m) about the centre of mass of the force in the proximal joint."""
+    return -com_distance * (math.cos(segment_angle) * joint_force_y - math.sin(segment_angle) * joint_force_x)
+
+
+@equation("r^2 x F_L", "distal_moment")
+def distal_moment(
+    segment_angle: float, distal_force_x: float, distal_force_y: float, com_distance: float, length: float
+) -> float:
+    """Moment (N m) about the centre of mass of a force at the distal end: that of the next joint, or the load."""
+    across = math.cos(segment_angle) * distal_force_y - math.sin(segment_angle) * distal_force_x
+    return (length - com_distance) * across
+
+
 @equation("2.57", "segment_velocity_rate")
 def segment_velocity_rate(
-    joint_torque: float,
-    next_joint_torque: float,
-    segment_angle: float,
-    joint_force_x: float,
-    joint_force_y: float,
-    next_joint_force_x: float,
-    next_joint_force_y: float,
-    com_distance: float,
-    length: float,
-    inertia: float,
+    joint_torque: float, next_joint_torque: float, proximal_moment: float, distal_moment: float, inertia: float
 ) -> float:
-    """Angular acceleration (rad/s^2) of a segment that carries another one."""
-    cosine, sine = math.cos(segment_angle), math.sin(segment_angle)
-    proximal = -com_distance * (cosine * joint_force_y - sine * joint_force_x)
-    distal = (length - com_distance) * (cosine * next_joint_force_y - sine * next_joint_force_x)
-    return (joint_torque - next_joint_torque + proximal - distal) / inertia
+    """Angular acceleration (rad/s^2) of a segment that carries another one, on which the distal force acts."""
+    return (joint_torque - next_joint_torque + proximal_moment - distal_moment) / inertia
 
 
 @equation("2.58", "segment_velocity_rate")
 def last_segment_velocity_rate(
-    joint_torque: float,
-    tip_torque: float,
-    segment_angle: float,
-    joint_force_x: float,
-    joint_force_y: float,
-    tip_force_x: float,
-    tip_force_y: float,
-    com_distance: float,
-    length: float,
-    inertia: float,
+    joint_torque: float, tip_torque: float, proximal_moment: float, distal_moment: float, inertia: float
 ) -> float:
     """Angular acceleration (rad/s^2) of the last segment, whose tip bears the load."""
-    cosine, sine = math.cos(segment_angle), math.sin(segment_angle)
-    proximal = -com_distance * (cosine * joint_force_y - sine * joint_force_x)
-    distal = (length - com_distance) * (cosine * tip_force_y - sine * tip_force_x)
-    return (joint_torque + tip_torque + proximal + distal) / inertia
+    return (joint_torque + tip_torque + proximal_moment + distal_moment) / inertia
 
 
 @equation("2.59 x", "com_velocity_x")

@@ -4,7 +4,7 @@ Bonds of length x (in units of the reach h) between myosin and actin are made at
 broken at g(x). Zahalak takes their distribution for a normal one, of which the first three moments
 are the states of the law: Q_0 (stiffness), Q_1 (force), Q_2 (elastic energy).
 
-Symbols of the paper: Q_i bond_moment_i, u bond_velocity, f_1 attachment, g_1 detachment,
+Symbols of the paper: Q_i bond_moment_i, F_i/Q_0 bond_loss_i, u bond_velocity, f_1 attachment, g_1 detachment,
 g_2 release, g_3 overstretch, h reach. Half a sarcomere shortens at half its velocity.
 """
 
@@ -51,52 +51,48 @@ def bond_deviation(bond_moment_0: float, bond_moment_2: float, bond_mean: float)
     return math.sqrt(max(1e-6, square - bond_mean * bond_mean))
 
 
-@equation("dQ_0/dt", "bond_moment_0_rate")
-def bond_moment_0_rate(
-    bond_moment_0: float,
-    bond_mean: float,
-    bond_deviation: float,
-    attachment: float,
-    detachment: float,
-    release: float,
-    overstretch: float,
+@equation("F_0/Q_0", "bond_loss_0")
+def bond_loss_0(
+    bond_mean: float, bond_deviation: float, attachment: float, detachment: float, release: float, overstretch: float
 ) -> float:
+    """Loss (1/s) of bonds, over their number."""
+    return loss_0(bond_mean, bond_deviation, attachment, detachment, release, overstretch)
+
+
+@equation("F_1/Q_0", "bond_loss_1")
+def bond_loss_1(
+    bond_mean: float, bond_deviation: float, attachment: float, detachment: float, release: float, overstretch: float
+) -> float:
+    """Loss (1/s) of the bonds' summed length, over their number."""
+    return loss_1(bond_mean, bond_deviation, attachment, detachment, release, overstretch)
+
+
+@equation("F_2/Q_0", "bond_loss_2")
+def bond_loss_2(
+    bond_mean: float, bond_deviation: float, attachment: float, detachment: float, release: float, overstretch: float
+) -> float:
+    """Loss (1/s) of the bonds' summed squared length, over their number."""
+    return loss_2(bond_mean, bond_deviation, attachment, detachment, release, overstretch)
+
+
+@equation("dQ_0/dt", "bond_moment_0_rate")
+def bond_moment_0_rate(bond_moment_0: float, bond_loss_0: float, attachment: float) -> float:
     """Rate (1/s) of the number of bonds: b_0 - F_0."""
-    lost = loss_0(bond_mean, bond_deviation, attachment, detachment, release, overstretch)
-    return attachment / 2.0 - bond_moment_0 * lost
+    return attachment / 2.0 - bond_moment_0 * bond_loss_0
 
 
 @equation("dQ_1/dt", "bond_moment_1_rate")
-def bond_moment_1_rate(
-    bond_moment_0: float,
-    bond_mean: float,
-    bond_deviation: float,
-    bond_velocity: float,
-    attachment: float,
-    detachment: float,
-    release: float,
-    overstretch: float,
-) -> float:
+def bond_moment_1_rate(bond_moment_0: float, bond_loss_1: float, bond_velocity: float, attachment: float) -> float:
     """Rate (1/s) of the bonds' summed length: b_1 - F_1 - u Q_0."""
-    lost = loss_1(bond_mean, bond_deviation, attachment, detachment, release, overstretch)
-    return attachment / 3.0 - bond_moment_0 * (lost + bond_velocity)
+    return attachment / 3.0 - bond_moment_0 * (bond_loss_1 + bond_velocity)
 
 
 @equation("dQ_2/dt", "bond_moment_2_rate")
 def bond_moment_2_rate(
-    bond_moment_0: float,
-    bond_moment_1: float,
-    bond_mean: float,
-    bond_deviation: float,
-    bond_velocity: float,
-    attachment: float,
-    detachment: float,
-    release: float,
-    overstretch: float,
+    bond_moment_0: float, bond_moment_1: float, bond_loss_2: float, bond_velocity: float, attachment: float
 ) -> float:
     """Rate (1/s) of the bonds' summed squared length: b_2 - F_2 - 2 u Q_1."""
-    lost = loss_2(bond_mean, bond_deviation, attachment, detachment, release, overstretch)
-    return attachment / 4.0 - bond_moment_0 * lost - 2.0 * bond_velocity * bond_moment_1
+    return attachment / 4.0 - bond_moment_0 * bond_loss_2 - 2.0 * bond_velocity * bond_moment_1
 
 
 def misfits(mean: float, variance: float, rates: Rates) -> tuple[float, float]:
@@ -209,6 +205,9 @@ huxley = register(
             bond_velocity,
             bond_mean,
             bond_deviation,
+            bond_loss_0,
+            bond_loss_1,
+            bond_loss_2,
             bond_moment_0_rate,
             bond_moment_1_rate,
             bond_moment_2_rate,
