@@ -1,7 +1,7 @@
 """Writes the tables of docs/reference from the code: commands, keys, laws, topics and parameters.
 
     python -m docs.generate          write them
-    python -m docs.generate --check  exit status 1 where they differ from the code
+    python -m docs.generate --check  exit status 1 if they differ from the code
 
 In a page, what stands between `<!-- NAME -->` and `<!-- end -->` is a table of this program; the
 rest is written by hand.
@@ -16,7 +16,9 @@ import pkgutil
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +36,7 @@ BLOCK = re.compile(r"<!-- (?!end)(\S+) -->\n.*?<!-- end -->", re.DOTALL)
 def main() -> int:
     """Write or check the pages."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--check", action="store_true", help="write nothing; status 1 where a page differs")
+    parser.add_argument("--check", action="store_true", help="write nothing; status 1 if a page differs")
     args = parser.parse_args()
     different = []
     for name in PAGES:
@@ -50,28 +52,20 @@ def main() -> int:
 
 
 def filled(page: str) -> str:
-    """A page with its tables made anew."""
-    tables = dict[str, str]()
+    """A page with new tables."""
 
-    def fill(found: re.Match[str]) -> str:
-        if not tables:
-            tables.update(all_tables())
-        return f"<!-- {found[1]} -->\n\n{tables[found[1]].strip()}\n\n<!-- end -->"
+    def fill(block: re.Match[str]) -> str:
+        return f"<!-- {block[1]} -->\n\n{all_tables()[block[1]].strip()}\n\n<!-- end -->"
 
     return BLOCK.sub(fill, page)
 
 
-_made: dict[str, str] = {}
-
-
+@cache
 def all_tables() -> dict[str, str]:
     """Every table by name."""
-    if not _made:
-        _made["commands"] = command_sections()
-        _made.update(key_tables())
-        _made["laws"] = law_sections()
-        _made["topics"], _made["node-parameters"] = node_tables()
-    return _made
+    topics, parameters = node_tables()
+    tables = {"commands": command_sections(), **key_tables(), "laws": law_sections()}
+    return {**tables, "topics": topics, "node-parameters": parameters}
 
 
 # Commands
@@ -88,9 +82,9 @@ def command_sections() -> str:
 def command_section(parser: argparse.ArgumentParser) -> str:
     """A subcommand: its usage, what it does, its arguments."""
     actions = [a for a in parser._actions if not isinstance(a, argparse._HelpAction)]
-    needed = [a for a in actions if a.required]
+    required = [a for a in actions if a.required]
     usage = " ".join(
-        [parser.prog, *(invocation(a) for a in needed), *(["[options]"] if len(needed) < len(actions) else [])]
+        [parser.prog, *(invocation(a) for a in required), *(["[options]"] if len(required) < len(actions) else [])]
     )
     rows = [(f"`{spelling(a)}`", (a.help or "") % {"default": a.default, **vars(a)}) for a in actions]
     return (
@@ -227,6 +221,13 @@ def default(parameter: Parameter) -> str:
 
 def node_tables() -> tuple[str, str]:
     """The topics with their quality of service, and the parameters of the nodes, as the nodes declare them."""
+    with started_nodes() as nodes:
+        return topic_table(nodes), "\n\n".join(node_section(node) for node in nodes)
+
+
+@contextmanager
+def started_nodes() -> Iterator[list[Any]]:
+    """A node of each kind, alone, that remembers as `declared` which parameters it declared with which default."""
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     with tempfile.TemporaryDirectory() as folder:
         os.environ.setdefault("ROS_LOG_DIR", folder)
@@ -244,32 +245,34 @@ def node_tables() -> tuple[str, str]:
             self.declared = {**getattr(self, "declared", {}), name: value}
             return declare(self, name, value, *rest)
 
+        given: dict[str, dict[str, Any]] = {
+            "activation_input": {"mode": "realtime"},
+            "limb_dynamics": {"await_recorder": True},
+            "recorder": {"out": f"{folder}/bag"},
+        }
         limb = str(DOCS.parent / "params" / "reference_joint.yaml")
         context = Context()
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
-        made = []
+        nodes: dict[str, Any] = {}
         LimbNode._declare = remembering
         try:
             for name, node_class in CLASSES.items():
-                given = {"limb": limb}
-                given |= {"mode": "realtime"} if name == "activation_input" else {}
-                given |= {"await_recorder": True} if name == "limb_dynamics" else {}
-                given |= {"out": f"{folder}/bag"} if name == "recorder" else {}
-                overrides = [RosParameter(key, value=value) for key, value in given.items()]
-                made.append(node_class(context=context, parameter_overrides=overrides))
+                values = {"limb": limb, **given.get(name, {})}
+                overrides = [RosParameter(key, value=value) for key, value in values.items()]
+                nodes[name] = node_class(context=context, parameter_overrides=overrides)
             # Which a live activation_input does by itself once the limb moves.
-            made[list(CLASSES).index("activation_input")].hear_envelopes()
-            return topic_table(made), "\n\n".join(node_section(node, made) for node in made)
+            nodes["activation_input"].hear_envelopes()
+            yield list(nodes.values())
         finally:
             LimbNode._declare = declare
-            for node in made:
+            for node in nodes.values():
                 node.destroy_node()
             rclpy.shutdown(context=context)
 
 
 def topic_table(nodes: Sequence[Any]) -> str:
     """Topics by name: type, who publishes, who subscribes, quality of service."""
-    found: dict[str, dict[str, Any]] = {}
+    topics: dict[str, dict[str, Any]] = {}
     for role in ("from", "to"):
         for node in nodes:
             # Those that the recorder polls are not among its `subscriptions`.
@@ -279,10 +282,10 @@ def topic_table(nodes: Sequence[Any]) -> str:
                     continue
                 # Who publishes comes first and says what is offered.
                 about = {"from": [], "to": [], "type": end.msg_type, "qos": quality(end.qos_profile)}
-                found.setdefault(topic, about)[role].append(f"`{node.get_name()}`")
+                topics.setdefault(topic, about)[role].append(f"`{node.get_name()}`")
     rows = []
-    for topic in sorted(found, key=lambda name: name.lstrip("/")):
-        entry = found[topic]
+    for topic in sorted(topics, key=lambda name: name.lstrip("/")):
+        entry = topics[topic]
         kind = f"{entry['type'].__module__.split('.')[0]}/{entry['type'].__name__}"
         ends = [", ".join(entry[role]) or "anyone" for role in ("from", "to")]
         rows.append((f"`{topic}`", f"`{kind}`", *ends, entry["qos"]))
@@ -295,7 +298,7 @@ def quality(profile: Any) -> str:
     return f"{profile.reliability.name.lower()}, {durability}, {profile.depth}"
 
 
-def node_section(node: Any, nodes: Sequence[Any]) -> str:
+def node_section(node: Any) -> str:
     """The parameters of a node with what it declares about them."""
     rows = []
     for name in node._parameters:

@@ -19,7 +19,7 @@ from limb_nodes.model.probe import Probe, given
 ANGLES = 181
 
 
-def check_unit(section: Section, values: dict[str, float], laws: dict[str, ChosenLaw]) -> None:
+def check_unit(section: Section, laws: dict[str, ChosenLaw]) -> None:
     """Refuse filaments whose lengths contradict each other."""
     chosen = laws["sarcomere"].values
     shortest = minimum_sarcomere_length(chosen["myosin_length"])
@@ -27,8 +27,8 @@ def check_unit(section: Section, values: dict[str, float], laws: dict[str, Chose
     if shortest >= optimal:
         section.fail(
             "sarcomere",
-            f"has the shortest length {shortest:g} m (0.9 myosin_length), which must be below "
-            f"the optimal length {optimal:g} m (2 actin_length)",
+            f"has the shortest length {shortest:g} m (0.9 myosin_length); one below the optimal length "
+            f"{optimal:g} m (2 actin_length) is needed",
         )
 
 
@@ -84,8 +84,8 @@ def check_geometry(file: str, muscle: Muscle, segment: Segment) -> None:
 def fibre_length(muscle: Muscle, muscle_length: float) -> float:
     """Fibre length (m) at a muscle length, for an aponeurosis without states."""
     chosen = muscle.laws["aponeurosis"]
-    found = Probe(chosen, given(chosen), {}).at(muscle_length=muscle_length, muscle_velocity=0.0, total_fibre_force=0.0)
-    return found["fibre_length"]
+    probe = Probe(chosen, given(chosen), {"muscle_velocity": 0.0, "total_fibre_force": 0.0})
+    return probe.at(muscle_length=muscle_length)["fibre_length"]
 
 
 def check_triangle(file: str, muscle: Muscle, longest: float) -> None:

@@ -166,7 +166,7 @@ def read_segment(section: Section) -> Segment:
         if joint_range[0] >= joint_range[1]:
             section.fail("range", f"is {list(joint_range)}; [lowest, highest] in rad is needed")
         if not joint_range[0] <= values["angle"] <= joint_range[1]:
-            section.fail("angle", f"is {values['angle']}; a number within range {list(joint_range)} in rad")
+            section.fail("angle", f"is {values['angle']}; a number within range {list(joint_range)} in rad is needed")
     else:
         section.take("range")
     name = section.text("name")
@@ -206,13 +206,6 @@ def read_muscle(
     return Muscle(name, joints.index(joint), role, threshold, laws, tuple(ordered), section.place)
 
 
-def overlaid(given: Any, own: Any) -> Any:
-    """A unit's own value over that of its kind: parameters of the same law are merged."""
-    if isinstance(given, dict) and isinstance(own, dict) and own.get("law", given.get("law")) == given.get("law"):
-        return {**given, **own}
-    return own
-
-
 def read_units(
     section: Section,
     position: int,
@@ -224,13 +217,7 @@ def read_units(
 
     given: laws of the units that the muscle's section chooses.
     """
-    if section.has("kind"):
-        kind = kinds[section.choice("kind", kinds)]
-        content = {**kind.content, **section.content}
-        for key, value in section.content.items():
-            content[key] = overlaid(kind.content.get(key), value)
-        inherited = {key: kind.at(key) for key in kind.content if key not in section.content}
-        section = Section(section.file, section.place, content, inherited)
+    section = with_kind(section, kinds)
     section.take("kind")
     name = section.text("name", section.content.get("kind") or f"unit{position + 1}")
     count = int(present(section.number(COUNT)))
@@ -245,14 +232,23 @@ def read_units(
         )
     laws = {name: given[name] if name in given else choose_law(section, name, sarcomeres) for name in UNIT_PROCESSES}
     section.finish()
-    check_unit(section, values, laws)
-    return [
-        (
-            order,
-            MotorUnit(name if count == 1 else f"{name}_{index + 1}", dict(values), laws),
-        )
-        for index in range(count)
-    ]
+    check_unit(section, laws)
+    names = [name] if count == 1 else [f"{name}_{index + 1}" for index in range(count)]
+    return [(order, MotorUnit(one, dict(values), laws)) for one in names]
+
+
+def with_kind(section: Section, kinds: dict[str, Section]) -> Section:
+    """A unit's section with what it leaves to its kind; parameters of the same law are merged."""
+    if not section.has("kind"):
+        return section
+    kind = kinds[section.choice("kind", kinds)]
+    content = {**kind.content, **section.content}
+    for key, own in section.content.items():
+        given = kind.content.get(key)
+        if isinstance(given, dict) and isinstance(own, dict) and own.get("law", given.get("law")) == given.get("law"):
+            content[key] = {**given, **own}
+    inherited = {key: kind.at(key) for key in kind.content if key not in section.content}
+    return Section(section.file, section.place, content, inherited)
 
 
 def read_named(top: Section, key: str) -> dict[str, Section]:

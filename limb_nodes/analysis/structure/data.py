@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from limb_nodes.analysis.structure.findings import Findings
-from limb_nodes.analysis.structure.matrix import structure_matrix
-from limb_nodes.analysis.structure.relations import Variable
+from limb_nodes.analysis.structure.matrix import Matrix, structure_matrix
+from limb_nodes.analysis.structure.relations import Relation, Variable
 
 
 def structure_data(findings: Sequence[Findings], limb_name: str, file: str) -> dict[str, Any]:
@@ -18,7 +18,6 @@ def structure_data(findings: Sequence[Findings], limb_name: str, file: str) -> d
 def level_data(one: Findings) -> dict[str, Any]:
     """One level. Equations are named by their place in the list `equations`, from 0."""
     system, offsets = one.system, one.offsets
-    matrix = structure_matrix(system)
     (over_equations, over_unknowns), (under_equations, under_unknowns) = one.parts.over, one.parts.under
     return {
         "level": system.name,
@@ -35,7 +34,7 @@ def level_data(one: Findings) -> dict[str, Any]:
         "blocks": [
             {
                 "equations": list(block.relations),
-                "unknowns": [{"variable": str(variable), "derivative": order} for variable, order in block.unknowns],
+                "unknowns": derivatives(block.unknowns),
             }
             for block in one.blocks
         ],
@@ -43,27 +42,39 @@ def level_data(one: Findings) -> dict[str, Any]:
         "underdetermined": {"equations": list(under_equations), "unknowns": names(under_unknowns)},
         "defined_by_none": names(one.undefined),
         "defined_twice": names(one.defined_twice),
-        "matrix": {
-            "rows": list(matrix.rows),
-            "columns": [{"symbol": column, "external": column in matrix.external} for column in matrix.columns],
-            "entries": [
-                {"row": row, "column": column, "mark": mark} for (row, column), mark in sorted(matrix.entries.items())
-            ],
-        },
-        "equations": [
-            {
-                "number": relation.number,
-                "owner": relation.owner,
-                "level": relation.level,
-                "process": relation.process,
-                "defines": {"variable": str(relation.defines.variable), "derivative": relation.defines.order},
-                "uses": [{"variable": str(variable), "derivative": order} for variable, order in relation.uses],
-            }
-            for relation in system.relations
-        ],
+        "matrix": matrix_data(structure_matrix(system)),
+        "equations": [equation_data(relation) for relation in system.relations],
         "unknowns": names(system.unknowns),
         "inputs": names(system.inputs),
     }
+
+
+def matrix_data(matrix: Matrix) -> dict[str, Any]:
+    """A structure matrix."""
+    return {
+        "rows": list(matrix.rows),
+        "columns": [{"symbol": column, "external": column in matrix.external} for column in matrix.columns],
+        "entries": [
+            {"row": row, "column": column, "mark": mark} for (row, column), mark in sorted(matrix.entries.items())
+        ],
+    }
+
+
+def equation_data(relation: Relation) -> dict[str, Any]:
+    """One equation."""
+    return {
+        "number": relation.number,
+        "owner": relation.owner,
+        "level": relation.level,
+        "process": relation.process,
+        "defines": derivatives([relation.defines])[0],
+        "uses": derivatives(relation.uses),
+    }
+
+
+def derivatives(terms: Iterable[tuple[Variable, int]]) -> list[dict[str, Any]]:
+    """Variables with the order of their derivative."""
+    return [{"variable": str(variable), "derivative": order} for variable, order in terms]
 
 
 def names(variables: Iterable[Variable]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from limb_nodes.analysis.structure import chain, muscles
 from limb_nodes.analysis.structure.muscles import APONEUROSIS, MUSCLE, SARCOMERE, TENDON, UNIT, unit_owner
@@ -24,6 +24,8 @@ TITLES = {
 }
 MUSCLE_LEVELS = (SARCOMERE, UNIT, MUSCLE, TENDON, APONEUROSIS)
 MUSCLE_LAWS = tuple(process for process in MUSCLE_PROCESSES if CONTRACTS[process].level == MUSCLE)
+# Of motor units, in the level of the muscle.
+COMMON_LAWS = tuple(process for process in UNIT_PROCESSES if CONTRACTS[process].level == MUSCLE)
 
 
 def equation_sets(limb: Limb, level: str | None = None) -> list[EquationSet]:
@@ -32,21 +34,19 @@ def equation_sets(limb: Limb, level: str | None = None) -> list[EquationSet]:
     Muscles and motor units with the same laws appear once, with all of them as members.
     """
     assembly = muscles.muscle_assembly(limb)
-    found: list[EquationSet] = []
-    found += sets_of_units(limb, assembly)
-    found += sets_of_muscles(limb, assembly)
+    sets = [*sets_of_units(limb, assembly), *sets_of_muscles(limb, assembly)]
     joints = limb.joint_names
     original = chain.original_assembly(limb)
-    found.append(original.view(chain.ORIGINAL, TITLES[chain.ORIGINAL], [chain.ORIGINAL], members=joints))
+    sets.append(original.view(chain.ORIGINAL, TITLES[chain.ORIGINAL], [chain.ORIGINAL], members=joints))
     transformed = Assembly()
     for relation in chain.transformed_relations(limb):
         transformed.add(relation)
-    found.append(transformed.view(chain.TRANSFORMED, TITLES[chain.TRANSFORMED], [chain.TRANSFORMED], members=joints))
+    sets.append(transformed.view(chain.TRANSFORMED, TITLES[chain.TRANSFORMED], [chain.TRANSFORMED], members=joints))
     for relation in [*chain.interface(limb, chain.INTERFACE), *chain.transformed_relations(limb)]:
         assembly.add(relation)
     every = (*MUSCLE_LEVELS, chain.INTERFACE, chain.TRANSFORMED)
-    found.append(assembly.view(MODEL, TITLES[MODEL], every, members=[limb.name]))
-    return [one for one in found if level is None or one.name == level]
+    sets.append(assembly.view(MODEL, TITLES[MODEL], every, members=[limb.name]))
+    return [one for one in sets if level is None or one.name == level]
 
 
 def sets_of_units(limb: Limb, assembly: Assembly) -> Iterator[EquationSet]:
@@ -65,46 +65,52 @@ def sets_of_units(limb: Limb, assembly: Assembly) -> Iterator[EquationSet]:
 
 def sets_of_muscles(limb: Limb, assembly: Assembly) -> Iterator[EquationSet]:
     """Muscles, tendons and aponeuroses, one set for each choice of laws; then muscles with all that is in them."""
-
-    def grouped(key: Callable[[Muscle], object]) -> list[list[Muscle]]:
-        alike: dict[object, list[Muscle]] = {}
-        for muscle in limb.muscles:
-            alike.setdefault(key(muscle), []).append(muscle)
-        return list(alike.values())
-
-    def laws_of(muscle: Muscle, processes: Sequence[str]) -> tuple[Law, ...]:
-        return tuple(muscle.laws[process].law for process in processes)
-
-    def recruitment(muscle: Muscle) -> tuple[Law, ...]:
-        return tuple(unit.laws["recruitment"].law for unit in muscle.units)
-
-    def names(muscle: Muscle, processes: Sequence[str]) -> dict[str, str]:
-        return {process: muscle.laws[process].law.name for process in processes}
-
-    for group in grouped(lambda m: (laws_of(m, MUSCLE_LAWS), recruitment(m))):
+    for group in grouped(limb, lambda muscle: (laws_of(muscle, MUSCLE_LAWS), unit_laws(muscle, COMMON_LAWS))):
         first = group[0]
-        laws = names(first, MUSCLE_LAWS) | {"recruitment": first.units[0].laws["recruitment"].law.name}
+        laws = named(laws_of(first, MUSCLE_LAWS)) | named(unit_laws(first, COMMON_LAWS)[0])
         yield owned_view(assembly, MUSCLE, [MUSCLE], owners_of(first), laws, [m.name for m in group])
     for level in (TENDON, APONEUROSIS):
-        for group in grouped(lambda m, level=level: m.laws[level].law):  # type: ignore[misc]
+        for group in grouped(limb, lambda muscle, level=level: laws_of(muscle, [level])):  # type: ignore[misc]
             first = group[0]
-            members = [m.name for m in group]
-            view = owned_view(assembly, level, [level], owners_of(first), names(first, [level]), members)
+            laws = named(laws_of(first, [level]))
+            view = owned_view(assembly, level, [level], owners_of(first), laws, [m.name for m in group])
             if view.relations:
                 yield view
-    for group in grouped(
-        lambda m: (
-            tuple(chosen.law for chosen in m.laws.values()),
-            tuple(tuple(chosen.law for chosen in unit.laws.values()) for unit in m.units),
-        )
-    ):
+    for group in grouped(limb, lambda muscle: (laws_of(muscle, muscle.laws), unit_laws(muscle, UNIT_PROCESSES))):
         first = group[0]
-        laws = {process: chosen.law.name for process, chosen in first.laws.items()}
-        for unit in first.units:
-            for process, chosen in unit.laws.items():
-                kinds = laws.get(process, "").split(", ")
-                laws[process] = ", ".join(dict.fromkeys([*filter(None, kinds), chosen.law.name]))
-        yield owned_view(assembly, ASSEMBLED, MUSCLE_LEVELS, owners_of(first), laws, [m.name for m in group])
+        yield owned_view(assembly, ASSEMBLED, MUSCLE_LEVELS, owners_of(first), all_laws(first), [m.name for m in group])
+
+
+def grouped(limb: Limb, key: Callable[[Muscle], object]) -> list[list[Muscle]]:
+    """The muscles of a limb, those with equal keys together."""
+    alike: dict[object, list[Muscle]] = {}
+    for muscle in limb.muscles:
+        alike.setdefault(key(muscle), []).append(muscle)
+    return list(alike.values())
+
+
+def laws_of(muscle: Muscle, processes: Iterable[str]) -> tuple[Law, ...]:
+    """A muscle's laws of some processes."""
+    return tuple(muscle.laws[process].law for process in processes)
+
+
+def unit_laws(muscle: Muscle, processes: Sequence[str]) -> tuple[tuple[Law, ...], ...]:
+    """The laws of some processes of each motor unit."""
+    return tuple(tuple(unit.laws[process].law for process in processes) for unit in muscle.units)
+
+
+def named(laws: Iterable[Law]) -> dict[str, str]:
+    """Names of laws by process."""
+    return {law.process: law.name for law in laws}
+
+
+def all_laws(muscle: Muscle) -> dict[str, str]:
+    """Names of all laws of a muscle and its motor units by process."""
+    names = named(laws_of(muscle, muscle.laws))
+    for process in UNIT_PROCESSES:
+        laws = [unit.laws[process].law.name for unit in muscle.units]
+        names[process] = ", ".join(dict.fromkeys(laws))
+    return names
 
 
 def owners_of(muscle: Muscle) -> set[str]:

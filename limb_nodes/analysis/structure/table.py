@@ -122,24 +122,30 @@ def blame_lines(one: Findings, width: int) -> list[str]:
                 f"{shortened(variable_names(unknowns) or 'none')}",
                 width,
             )
-    if one.differentiated:
-        counts: dict[int, list[Relation]] = {}
-        for place, times in one.differentiated.items():
-            counts.setdefault(times, []).append(relations[place])
-        text = "; ".join(
-            f"{equation_names(several)} {TIMES.get(times, f'{times} times')}"
-            for times, several in sorted(counts.items(), reverse=True)
-        )
-        lines += wrapped(f"to be differentiated: {text}", width)
-        assert one.offsets is not None
-        shown: dict[str, None] = {}
-        for rows, nodes in one.offsets.constraints:
-            labels = counted([relations[i].label + PRIME * times for i, times in rows])
-            held = counted([symbol(variable.name) + PRIME * order for variable, order in nodes])
-            verb = "holds" if len(rows) == 1 else "together hold"
-            shown.setdefault(f"{labels} {verb} only {held}" if held else f"{labels} {verb} nothing but states")
-        for text in shown:
-            lines += wrapped(f"constraint: {text}", width)
+    return lines + differentiation_lines(one, width)
+
+
+def differentiation_lines(one: Findings, width: int) -> list[str]:
+    """The equations that must be differentiated, and the constraints that ask for it."""
+    if not one.offsets or not one.differentiated:
+        return []
+    relations = one.system.relations
+    counts: dict[int, list[Relation]] = {}
+    for place, times in one.differentiated.items():
+        counts.setdefault(times, []).append(relations[place])
+    text = "; ".join(
+        f"{equation_names(several)} {TIMES.get(times, f'{times} times')}"
+        for times, several in sorted(counts.items(), reverse=True)
+    )
+    lines = wrapped(f"to be differentiated: {text}", width)
+    shown: dict[str, None] = {}
+    for rows, nodes in one.offsets.constraints:
+        labels = counted([relations[i].label + PRIME * times for i, times in rows])
+        held = counted([symbol(variable.name) + PRIME * order for variable, order in nodes])
+        verb = "holds" if len(rows) == 1 else "together hold"
+        shown.setdefault(f"{labels} {verb} only {held}" if held else f"{labels} {verb} nothing but states")
+    for text in shown:
+        lines += wrapped(f"constraint: {text}", width)
     return lines
 
 
