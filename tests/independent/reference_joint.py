@@ -40,15 +40,14 @@ def pendulum(gravity: float = GRAVITY, load: float = 0.0) -> float:
     return small / (4.0 * float(ellipk(math.sin(START / 2) ** 2)))
 
 
-def force_velocity(velocity: float) -> float:
-    """2.11, 2.12: force over the isometric force at a sarcomere's shortening velocity (m/s)."""
-    norm = velocity / (1.15 * FASTEST)
+def force_velocity(norm: float, elasticity: float = ELASTICITY, plateau: float = PLATEAU) -> float:
+    """2.12: force of a sarcomere over its isometric force at a shortening velocity over 1.15 of the greatest (2.11)."""
     if norm <= 0.0:
-        bend = (PLATEAU - 1.0) / (1.0 + ELASTICITY / 0.15)
-        return 1.0 - (PLATEAU - 1.0) * norm / (bend - norm)
+        bend = (plateau - 1.0) / (1.0 + elasticity / 0.15)
+        return 1.0 - (plateau - 1.0) * norm / (bend - norm)
     # At lower velocities it is 0 to the last digit, and the exponential overflows.
     back = 1.0 / math.expm1(0.15 / norm) if norm > 1e-3 else 0.0
-    return -math.expm1(-0.15 / norm) * (1.0 - ELASTICITY * (norm / 0.15 - back) - norm)
+    return -math.expm1(-0.15 / norm) * (1.0 - elasticity * (norm / 0.15 - back) - norm)
 
 
 def length_norm(length: float) -> float:
@@ -73,7 +72,7 @@ def fibre_force(length: float, velocity: float, factor: float) -> float:
     if factor == 0.0:
         return passive
     by_length = math.exp(-(abs((norm**2.3 - 1.0) / 1.12) ** 1.61))
-    return STRONGEST * by_length * factor * force_velocity(velocity / SERIES) + passive
+    return STRONGEST * by_length * factor * force_velocity(velocity / SERIES / (1.15 * FASTEST)) + passive
 
 
 def path(angle: float, role: float) -> tuple[float, float]:
