@@ -14,7 +14,7 @@ from uuid import uuid4
 
 import numpy as np
 
-from limb_nodes.errors import UserError
+from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.limb import Limb
 from limb_nodes.model.load import build_limb
@@ -64,7 +64,7 @@ class Order:
         return build_limb(self.content, self.file, self.text)
 
 
-class Ensemble:
+class SampleSolver:
     """Solves samples one by one; its methods may be called from several threads."""
 
     def __init__(self, order: Order, limb: Limb) -> None:
@@ -103,79 +103,88 @@ class Ensemble:
             return problem
 
 
-def simulate_ensemble(
-    limb: Limb,
-    samples: Samples,
-    excitation: FloatArray,
-    rate: float,
-    *,
-    times: FloatArray | None = None,
-    function: Callable[[Movement], Any] | None = None,
-    tolerance: float = TOLERANCE,
-    method: str = "auto",
-    threads: int | None = None,
-    client: Any = None,
-    ordered: bool = True,
-) -> Iterator[tuple[int, Any]]:
-    """Solve a limb with the numbers of many samples; yields (index of the sample, result).
+class Ensemble:
+    """Many samples of one limb: other numbers, the same input.
 
-    samples: one mapping of places to values each, as for `with_values`, from any iterable, which is
-        read as results are taken; or one mapping of places to arrays [N].
-    excitation: [T, muscles], sampled at `rate` Hz from t = 0, of all samples.
-    times: s, rising, within the input, at which a `Solution` is given; default: every input sample.
-    function: called with the `Movement` of a sample, all outputs filled in; its result then takes
-        the place of the `Solution`. On a cluster it must be picklable.
+    limb: the limb of all samples. excitation: [T, muscles], sampled at `rate` Hz from t = 0, of all samples.
     tolerance, method: as for `WholeModel.simulate`; "auto" chooses for the limb itself, and all samples follow.
-    threads: default: one per core of this process. client: a `dask.distributed.Client`, whose
-        workers then do the work; they need this package and the limb's own laws at the same place.
-    ordered: whether results come in the order of the samples or as they are there.
-
-    A sample that cannot be built or solved, or whose `function` raises, gives its exception as its
-    result and leaves the others alone. Few samples are under way at a time, whatever their number.
-
-    The numbers of a sample are checked against the ranges that their parameters declare, and a
-    muscle's lengths against its joint; curves of laws are examined for the limb itself alone,
-    unless a sample changes more than single numbers.
+    Raises UserError if no sample can be solved with these.
     """
-    excitation = np.ascontiguousarray(excitation, dtype=np.float64)
-    refuse(limb, excitation, rate, times, function, method, threads)
-    asked = None if times is None else np.array(times, dtype=np.float64)
-    order = Order(limb.content, limb.file, limb.text, excitation, rate, asked, function, tolerance, method)
-    numbered = enumerate(one_by_one(limb, samples))
-    if client is not None:
-        return on_cluster(client, order, numbered, ordered)
-    ensemble = Ensemble(order, limb)
-    return in_threads(ensemble.solve, numbered, threads or cores(), ordered)
 
+    def __init__(
+        self, limb: Limb, excitation: FloatArray, rate: float, *, tolerance: float = TOLERANCE, method: str = "auto"
+    ) -> None:
+        self.limb, self.rate, self.tolerance, self.method = limb, rate, tolerance, method
+        self.excitation = np.ascontiguousarray(excitation, dtype=np.float64)
+        muscles = len(limb.muscles)
+        if self.excitation.ndim != 2 or len(self.excitation) < 2 or self.excitation.shape[1] != muscles:
+            shape = self.excitation.shape
+            raise FieldError("excitation", f"has the shape {shape}; [two or more, {muscles}] is needed", limb.file)
+        if not rate > 0.0:
+            raise FieldError("rate", f"is {rate:g}; a number > 0 in Hz is needed", limb.file)
+        if method != "auto" and method not in METHODS:
+            raise FieldError("method", f"is {method!r}; auto or {' or '.join(METHODS)} is needed", limb.file)
 
-def refuse(
-    limb: Limb,
-    excitation: FloatArray,
-    rate: float,
-    times: FloatArray | None,
-    function: Callable[[Movement], Any] | None,
-    method: str,
-    threads: int | None,
-) -> None:
-    """Refuse what no sample can be solved with."""
-    muscles = len(limb.muscles)
-    if excitation.ndim != 2 or len(excitation) < 2 or excitation.shape[1] != muscles:
-        raise UserError(f"{limb.file}: excitation has the shape {excitation.shape}; [two or more, {muscles}] is needed")
-    if not rate > 0.0:
-        raise UserError(f"{limb.file}: rate is {rate:g}; a number > 0 in Hz is needed")
-    if method != "auto" and method not in METHODS:
-        raise UserError(f"{limb.file}: method is {method!r}; allowed: auto, {', '.join(METHODS)}")
-    if threads is not None and threads < 1:
-        raise UserError(f"{limb.file}: threads is {threads}; an integer >= 1 is needed")
-    if times is None:
-        return
-    if function is not None:
-        raise UserError(f"{limb.file}: times and function are both given; a function gets every input sample")
-    end = (len(excitation) - 1) / rate
-    given = np.asarray(times, dtype=np.float64)
-    rising = given.ndim == 1 and given.size > 0 and bool((np.diff(given) > 0.0).all())
-    if not (rising and given[0] >= 0.0 and given[-1] <= end * (1.0 + 1e-12)):
-        raise UserError(f"{limb.file}: times must rise from 0 at the earliest to the input's end, {end:g} s")
+    def solve(
+        self,
+        samples: Samples,
+        *,
+        times: FloatArray | None = None,
+        function: Callable[[Movement], Any] | None = None,
+        threads: int | None = None,
+        client: Any = None,
+        ordered: bool = True,
+    ) -> Iterator[tuple[int, Any]]:
+        """Solve the limb with the numbers of each sample; yields (index of the sample, result).
+
+        samples: one mapping of places to values each, as for `with_values`, from any iterable, which is
+            read as results are taken; or one mapping of places to arrays [N].
+        times: s, rising, within the input, at which a `Solution` is given; default: every input sample.
+        function: called with the `Movement` of a sample, all outputs filled in; its result then takes
+            the place of the `Solution`. On a cluster it must be picklable.
+        threads: default: one per core of this process. client: a `dask.distributed.Client`, whose
+            workers then do the work; they need this package and the limb's own laws at the same place.
+        ordered: whether results come in the order of the samples or as they are there.
+
+        A sample that cannot be built or solved, or whose `function` raises, gives its exception as its
+        result and leaves the others alone. Few samples are under way at a time, whatever their number.
+
+        The numbers of a sample are checked against the ranges that their parameters declare, and a
+        muscle's lengths against its joint; curves of laws are examined for the limb itself alone,
+        unless a sample changes more than single numbers.
+        """
+        limb = self.limb
+        if threads is not None and threads < 1:
+            raise FieldError("threads", f"is {threads}; an integer >= 1 is needed", limb.file)
+        asked = None if times is None else self._within(times)
+        if asked is not None and function is not None:
+            raise FieldError("times", "is given, and function too; a function gets every input sample", limb.file)
+        order = Order(
+            limb.content,
+            limb.file,
+            limb.text,
+            self.excitation,
+            self.rate,
+            asked,
+            function,
+            self.tolerance,
+            self.method,
+        )
+        numbered = enumerate(one_by_one(limb, samples))
+        if client is not None:
+            return on_cluster(client, order, numbered, ordered)
+        return in_threads(SampleSolver(order, limb).solve, numbered, threads or cores(), ordered)
+
+    def _within(self, times: FloatArray) -> FloatArray:
+        """Times (s) that the input covers."""
+        end = (len(self.excitation) - 1) / self.rate
+        given = np.array(times, dtype=np.float64)
+        rising = given.ndim == 1 and given.size > 0 and bool((np.diff(given) > 0.0).all())
+        if not (rising and given[0] >= 0.0 and given[-1] <= end * (1.0 + 1e-12)):
+            raise FieldError(
+                "times", f"leave the input; times that rise from 0 to {end:g} s are needed", self.limb.file
+            )
+        return given
 
 
 def one_by_one(limb: Limb, samples: Samples) -> Iterator[Values]:
@@ -237,21 +246,21 @@ def flow(
 
 
 class Workshop:
-    """The ensembles that a worker of a cluster keeps from chunk to chunk, by the token of their order."""
+    """The solvers that a worker of a cluster keeps from chunk to chunk, by the token of their order."""
 
     def __init__(self, most: int) -> None:
         self._most = most
         self._lock = Lock()
-        self._ensembles: dict[str, Ensemble] = {}
+        self._solvers: dict[str, SampleSolver] = {}
 
-    def ensemble(self, token: str, order: Order) -> Ensemble:
+    def solver(self, token: str, order: Order) -> SampleSolver:
         """That of an order, built if it is not there; the oldest gives way."""
         with self._lock:
-            if token not in self._ensembles:
-                while len(self._ensembles) >= self._most:
-                    del self._ensembles[next(iter(self._ensembles))]
-                self._ensembles[token] = Ensemble(order, order.limb())
-            return self._ensembles[token]
+            if token not in self._solvers:
+                while len(self._solvers) >= self._most:
+                    del self._solvers[next(iter(self._solvers))]
+                self._solvers[token] = SampleSolver(order, order.limb())
+            return self._solvers[token]
 
 
 WORKSHOP = Workshop(4)
@@ -260,10 +269,10 @@ WORKSHOP = Workshop(4)
 def solve_chunk(token: str, order: Order, chunk: list[tuple[int, Values]]) -> list[tuple[int, Any]]:
     """What a worker of a cluster does."""
     try:
-        ensemble = WORKSHOP.ensemble(token, order)
+        solver = WORKSHOP.solver(token, order)
     except Exception as problem:
         return [(index, problem) for index, _ in chunk]
-    return [(index, ensemble.solve(values)) for index, values in chunk]
+    return [(index, solver.solve(values)) for index, values in chunk]
 
 
 def on_cluster(

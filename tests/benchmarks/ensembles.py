@@ -9,7 +9,7 @@ import numpy as np
 
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import with_values
-from limb_nodes.solve.ensemble import cores, simulate_ensemble
+from limb_nodes.solve.ensemble import Ensemble, cores
 from tests.benchmarks import works
 from tests.benchmarks.peers import mujoco_limb
 from tests.benchmarks.solving import PRODUCT, loosest, missing, product
@@ -37,13 +37,10 @@ def ensemble(rounds: int, duration: float, count: int = 1000) -> Iterator[Row]:
     tolerance, _ = loosest(work, partial(product, work), range(6, 12))
     times = np.linspace(0.0, duration, OUTPUTS + 1)
 
+    many = Ensemble(work.limb, work.excitation, RATE, tolerance=tolerance)
+
     def solved(threads: int) -> list[object]:
-        return [
-            result
-            for _, result in simulate_ensemble(
-                work.limb, given, work.excitation, RATE, times=times, tolerance=tolerance, threads=threads
-            )
-        ]
+        return [result for _, result in many.solve(given, times=times, threads=threads)]
 
     threads = cores()
     engines = {f"{PRODUCT}, {n} threads": partial(timed, partial(solved, n)) for n in sorted({1, 2, threads})}
