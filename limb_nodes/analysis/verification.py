@@ -40,7 +40,7 @@ JOINT, TENDON = "reference_joint.yaml", "reference_joint_tendon.yaml"
 class Quantity:
     """A number that a case must show.
 
-    name: with its unit. tolerance: greatest distance of found from expected. find: it in a trajectory.
+    name: with its unit. tolerance: greatest distance from what is expected. find: measures it in a trajectory.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Case:
     """A case of the report.
 
     figure: of the report. set_up: in words. limb: shipped file; values: what is changed in it, as for `with_values`.
-    activation: constants, a shipped file, or nothing where there are no muscles. duration: s.
+    activation: constants, a shipped file, or nothing without muscles. duration: s.
     states: whether figure or quantities need the states of muscles and motor units.
     """
 
@@ -89,17 +89,17 @@ class Case:
 
 @dataclass(frozen=True)
 class Finding:
-    """What one way of running shows of a quantity. found: not a number where there is none."""
+    """What one way of running shows of a quantity. value: not a number if there is none."""
 
     case: Case
     quantity: Quantity
     solver: str
-    found: float
+    value: float
 
     @property
     def passed(self) -> bool:
         """Whether it is as expected."""
-        return abs(self.found - self.quantity.expected) <= self.quantity.tolerance
+        return abs(self.value - self.quantity.expected) <= self.quantity.tolerance
 
     def plain(self) -> dict[str, Any]:
         """The same as data for JSON."""
@@ -107,7 +107,7 @@ class Finding:
             "case": self.case.name,
             "quantity": self.quantity.name,
             "expected": self.quantity.expected,
-            "found": self.found if math.isfinite(self.found) else None,
+            "found": self.value if math.isfinite(self.value) else None,
             "tolerance": self.quantity.tolerance,
             "passed": self.passed,
             "solver": self.solver,
@@ -120,8 +120,8 @@ def solve_whole(case: Case, limb: Limb) -> Trajectory:
     return trajectory_of_movement(limb, movement)
 
 
-def examine(case: Case, solver: str, trajectory: Trajectory | None) -> list[Finding]:
-    """Find every quantity of a case; none where there is no trajectory."""
+def measure(case: Case, solver: str, trajectory: Trajectory | None) -> list[Finding]:
+    """Measure every quantity of a case; not numbers without a trajectory."""
     return [
         Finding(case, quantity, solver, float("nan") if trajectory is None else quantity.find(trajectory))
         for quantity in case.quantities
@@ -188,34 +188,34 @@ def last_torque(trajectory: Trajectory) -> float:
 
 
 def tendon_length(muscle: int, instant: int) -> Callable[[Trajectory], float]:
-    """Finds the tendon length (m) of a muscle at an instant."""
+    """Measures the tendon length (m) of a muscle at an instant."""
     return lambda trajectory: float(trajectory.muscle["tendon_length"][instant, muscle])
 
 
 def slowing_share(direction: float) -> Callable[[Trajectory], float]:
-    """Finds the share of instants at which the joint does not speed up in a direction."""
+    """Measures the share of instants at which the joint does not speed up in a direction."""
     return lambda trajectory: float(np.mean(direction * np.diff(trajectory.velocity[:, 0]) <= 0.0))
 
 
 def arrival(limit: float) -> Callable[[Trajectory], float]:
-    """Finds the time (s) of the first instant at which the joint is at a limit."""
+    """Measures the time (s) of the first instant at which the joint is at a limit."""
 
-    def find(trajectory: Trajectory) -> float:
+    def measured(trajectory: Trajectory) -> float:
         there = np.abs(trajectory.angle[:, 0] - limit) < 1e-9
         return float(trajectory.time[int(there.argmax())]) if there.any() else float("nan")
 
-    return find
+    return measured
 
 
 def straying(limit: float) -> Callable[[Trajectory], float]:
-    """Finds how far (rad) the joint leaves a limit again, or passes it."""
+    """Measures how far (rad) the joint leaves a limit again, or passes it."""
 
-    def find(trajectory: Trajectory) -> float:
+    def measured(trajectory: Trajectory) -> float:
         away = np.abs(trajectory.angle[:, 0] - limit)
         there = away < 1e-9
         return float(away[int(there.argmax()) :].max()) if there.any() else float("nan")
 
-    return find
+    return measured
 
 
 def wrongly_firing(trajectory: Trajectory) -> float:
@@ -224,7 +224,7 @@ def wrongly_firing(trajectory: Trajectory) -> float:
 
 
 def firing_share(muscle: int) -> Callable[[Trajectory], float]:
-    """Finds the share of the time in which the unit of a muscle fires; the last instant begins another period."""
+    """Measures the share of the time in which the unit of a muscle fires; the last instant begins another period."""
     return lambda trajectory: float(np.mean(trajectory.unit["stimulation_frequency"][:-1, muscle] > 0.0))
 
 

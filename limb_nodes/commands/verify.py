@@ -48,7 +48,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the cases, print, draw; 1 if a quantity is not as expected."""
-    from limb_nodes.analysis.verification import CASES, examine
+    from limb_nodes.analysis.verification import CASES, measure
 
     cases = chosen(args.case, CASES)
     folder = Path(args.limbs) if args.limbs else None
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     for way in ways:
         for case in cases:
             trajectory = run_case(case, limbs[case.name], way)
-            findings += examine(case, way, trajectory)
+            findings += measure(case, way, trajectory)
             if trajectory is not None:
                 trajectories[case.name][way] = trajectory
     if pictures:
@@ -171,7 +171,7 @@ def table(cases: Sequence[Case], ways: Sequence[str], findings: Sequence[Finding
             of = [by_key[case.name, quantity.name, way] for way in ways]
             failed = [finding.solver for finding in of if not finding.passed]
             verdict = f"FAILED ({', '.join(failed)})" if failed else "passed"
-            numbers = [number(value) for value in (quantity.expected, *(finding.found for finding in of))]
+            numbers = [number(value) for value in (quantity.expected, *(finding.value for finding in of))]
             rows.append((f"  {quantity.name}", *numbers, f"{quantity.tolerance:.2g}", verdict))
     head, *texts = aligned(rows, "l" + "r" * (len(ways) + 2))
     lines, rest = [head], iter(texts)

@@ -176,7 +176,7 @@ CONTRACTS: dict[str, Contract] = {
             ("excitation",),
             ("activation",),
             "none",
-            ("rises with the excitation and is not negative, where the law has no states",),
+            ("rises with the excitation and is not negative, if the law has no states",),
         ),
     )
 }

@@ -22,7 +22,7 @@ ScalarFunction = Callable[..., float]
 class Equation:
     """One equation of the model in the form ``defines = function(uses)``.
 
-    number: the equation's number in the report, or a short name where the report has none.
+    number: the equation's number in the report, or a short name if the report has none.
     defines: the variable on the left-hand side.
     function: pure function of floats that returns a float.
     """

@@ -67,13 +67,13 @@ def function_tree(function: ScalarFunction) -> ast.FunctionDef:
 
 def helper_functions(function: ScalarFunction) -> dict[str, ScalarFunction]:
     """Plain functions that a function calls by a global name, by that name."""
-    found: dict[str, ScalarFunction] = {}
+    helpers: dict[str, ScalarFunction] = {}
     for node in ast.walk(function_tree(function)):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             target = function.__globals__.get(node.func.id)
             if inspect.isfunction(target):
-                found[node.func.id] = target
-    return found
+                helpers[node.func.id] = target
+    return helpers
 
 
 def global_constants(function: ScalarFunction) -> dict[str, float]:
@@ -89,7 +89,7 @@ def global_constants(function: ScalarFunction) -> dict[str, float]:
 
 
 def refuse_unsupported(function: ScalarFunction) -> None:
-    """Raise UnsupportedCode where a function, or one that it calls, is outside the subset."""
+    """Raise UnsupportedCode if a function, or one that it calls, is outside the subset."""
     seen: set[ScalarFunction] = set()
     waiting = [function]
 
@@ -229,7 +229,7 @@ class Tangent:
         return name
 
     def expression(self, node: ast.expr, depth: int) -> tuple[str, str]:
-        """Text of value and derivative of an expression; the derivative is '' where it is zero."""
+        """Text of value and derivative of an expression; the derivative is '' if it is zero."""
         if not self.varies(node):
             return f"({self.plain(node)})", ""
         if isinstance(node, ast.Name):
@@ -335,7 +335,7 @@ class Tangent:
             x, dx = kept[0]
             slope = f"({DERIVATIVES[name].format(x=x, y=value)}) * {dx}"
         else:
-            self.fail(node, f"math.{name} is not allowed where its argument varies")
+            self.fail(node, f"math.{name} is not allowed of an argument that varies")
         return value, self.keep(slope, depth)
 
     def module(self, name: str) -> Any:

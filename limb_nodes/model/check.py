@@ -75,9 +75,9 @@ def check_geometry(file: str, muscle: Muscle, segment: Segment) -> None:
         if longest < least or shortest > most:
             optimal = series * optimal_sarcomere_length(sarcomere["actin_length"])
             raise UserError(
-                f"{file}: {muscle.place}.units[{index}].series_sarcomeres is {series:g}: fibres "
-                f"of {least:.4g} to {most:.4g} m (optimal {optimal:.4g}) never meet the lengths "
-                f"{shortest:.4g} to {longest:.4g} m that the joint allows"
+                f"{file}: {muscle.place}.units[{index}].series_sarcomeres is {series:g}, which gives "
+                f"fibres of {least:.4g} to {most:.4g} m (optimal {optimal:.4g}); fibres that reach the lengths "
+                f"{shortest:.4g} to {longest:.4g} m of the joint are needed"
             )
 
 

@@ -1,7 +1,7 @@
 """Checks of a limb's laws when it is loaded: each keeps what the contract of its process asks for.
 
 Every law is evaluated in plain Python over its declared range (`Law.ranges`, else the range that
-its check gives). What is wrong is said with the place where it breaks.
+its check gives). What is wrong is said with the place at which it is.
 """
 
 from __future__ import annotations

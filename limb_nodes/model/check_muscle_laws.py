@@ -75,7 +75,7 @@ def aponeurosis_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
     optimal = context["optimal_length"]
     lengths = grid(0.5 * optimal, 1.5 * optimal, 4)
     if states:
-        # Only some lengths go with a state; where they do not, `check_geometry` says so.
+        # Only some lengths go with a state; if none does, `check_geometry` says so.
         lengths = [max(optimal, 2.0 * max(states.values()))]
     for length in lengths:
         points = [probe.at(**states, muscle_length=length, total_fibre_force=force) for force in FORCES]

@@ -107,7 +107,7 @@ def force_frequency_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
         if fault:
             return fault
         if abs(values[0]) > 1e-9:
-            return f"{name} is {number(values[0])} at {place(variable, 0.0)}{words}; it must be 0"
+            return f"{name} is {number(values[0])} at {place(variable, 0.0)}{words}; 0 is needed"
     return ""
 
 
@@ -127,7 +127,7 @@ def recruitment_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
             values = [probe.at(**unit, activation=a)[name] for a in activations]
             fault = curve_fault(name, variable, activations, values, direction=1, least=0.0, suffix=words)
             if not fault and activations[0] == 0.0 and values[0] != 0.0:
-                fault = f"{name} is {number(values[0])} at {place(variable, 0.0)}{words}; it must be 0"
+                fault = f"{name} is {number(values[0])} at {place(variable, 0.0)}{words}; 0 is needed"
         if fault:
             return fault
     return ""

@@ -66,7 +66,7 @@ def find_law(section: Section, process: str) -> tuple[Law, str]:
         section.fail("law", f"is {name!r}; it cannot be imported: {one_line(problem) or type(problem).__name__}")
     law = getattr(module, attribute, None)
     if not isinstance(law, Law):
-        section.fail("law", f"is {name!r}; {attribute} in {module_name} is no law")
+        section.fail("law", f"is {name!r}; a law is needed, which {attribute} in {module_name} is not")
     elif law.process != process:
         section.fail("law", f"is {name!r}, a law of {law.process}; a law of {process} is needed")
     assert isinstance(law, Law)

@@ -49,20 +49,20 @@ def curve_fault(
     least: float = -math.inf,
     suffix: str = "",
 ) -> str:
-    """Where a curve is not finite, goes below `least`, or against `direction` (-1 falls, 1 rises)."""
+    """The place at which a curve is not finite, goes below `least`, or against `direction` (-1 falls, 1 rises)."""
     for x, y in zip(xs, ys, strict=True):
         if not math.isfinite(y):
-            return f"{name} is {number(y)} at {place(variable, x)}{suffix}; it must be finite"
+            return f"{name} is {number(y)} at {place(variable, x)}{suffix}; a finite number is needed"
         if y < least:
-            return f"{name} is {number(y)} at {place(variable, x)}{suffix}; it must be at least {least:g}"
+            return f"{name} is {number(y)} at {place(variable, x)}{suffix}; a number >= {least:g} is needed"
     if direction:
         slack = ROUND_OFF * max(abs(y) for y in ys)
         for (x0, y0), (x1, y1) in pairwise(zip(xs, ys, strict=True)):
             if direction * (y1 - y0) < -slack:
-                wrong, right = ("rises", "fall") if direction < 0 else ("falls", "rise")
+                wrong, right = ("rises", "falls") if direction < 0 else ("falls", "rises")
                 unit = UNITS.get(variable, "")
                 span = f"{variable} {x0:.6g} and {x1:.6g}{' ' + unit if unit else ''}"
-                return f"{name} {wrong} between {span}{suffix}; it must {right}"
+                return f"{name} {wrong} between {span}{suffix}; a law that {right} is needed"
     return ""
 
 
@@ -83,7 +83,9 @@ def kink_fault(name: str, variable: str, curve: Callable[[float], float], scale:
     gap = max(abs(value - middle) for value in values)
     at_zero = place(variable, 0.0) + suffix
     if gap > KINK * step * steepest + 1e-9 * abs(middle):
-        return f"{name} jumps from {values[0]:.4g} over {middle:.4g} to {values[1]:.4g} at {at_zero}"
+        steps = f"from {values[0]:.4g} over {middle:.4g} to {values[1]:.4g}"
+        return f"{name} jumps {steps} at {at_zero}; a continuous law is needed"
     if abs(slopes[1] - slopes[0]) > KINK * steepest + 1e-14 * abs(middle) / step:
-        return f"{name} has a kink at {at_zero}: its slope is {slopes[0]:.4g} below and {slopes[1]:.4g} above"
+        sides = f"its slope is {slopes[0]:.4g} below and {slopes[1]:.4g} above"
+        return f"{name} has a kink at {at_zero}: {sides}; a smooth law is needed"
     return ""

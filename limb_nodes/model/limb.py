@@ -12,7 +12,7 @@ from limb_nodes.model.chosen import ChosenLaw
 class Segment:
     """A segment and the joint at its proximal end. SI units, radians.
 
-    joint_range: lowest and highest joint angle, or None where the joint turns freely.
+    joint_range: lowest and highest joint angle, or None if the joint turns freely.
     angle, velocity: of the joint at the start.
     """
 

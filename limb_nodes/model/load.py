@@ -106,12 +106,12 @@ def with_values(limb: Limb, values: Mapping[str, Any]) -> Limb:
                     target[step] = [] if isinstance(following, int) else {}
                 target = target[step]
             except (IndexError, KeyError, TypeError):
-                raise UserError(f"{limb.file}: {place} is not a place of this limb") from None
+                raise UserError(f"{limb.file}: {place} is not a place; a key of the limb is needed") from None
         try:
             # Numbers of numpy as plain ones, which YAML can hold.
             target[steps[-1]] = value.item() if hasattr(value, "item") else value
         except (IndexError, TypeError):
-            raise UserError(f"{limb.file}: {place} is not a place of this limb") from None
+            raise UserError(f"{limb.file}: {place} is not a place; a key of the limb is needed") from None
     return build_limb(content, limb.file, yaml_text(content))
 
 
@@ -194,7 +194,7 @@ def read_muscle(
         new = read_units(unit_section, position, sarcomeres, kinds, of_units)
         for _, unit in new:
             if unit.name in names:
-                section.fail(f"units[{position}].name", f"is {unit.name!r} a second time; names are unique")
+                section.fail(f"units[{position}].name", f"is {unit.name!r} a second time; a name of its own is needed")
         units += new
     units.sort(key=lambda entry: entry[0])
     ordered = [unit for _, unit in units]
@@ -264,7 +264,7 @@ def refuse_duplicates(section: Section, key: str, field: str, names: list[str]) 
     """Refuse a list in which two entries have the same name."""
     for index, name in enumerate(names):
         if name in names[:index]:
-            section.fail(f"{key}[{index}].{field}", f"is {name!r} a second time; names are unique")
+            section.fail(f"{key}[{index}].{field}", f"is {name!r} a second time; a name of its own is needed")
 
 
 def pair(values: tuple[float, ...]) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Where joints, centres of mass and tip of a limb are (2.65)."""
+"""Positions of the joints, centres of mass and tip of a limb (2.65)."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ def points(limb: Limb, angle: Sequence[float]) -> list[tuple[float, float]]:
     """Positions (m) of the points at joint angles (rad), in the order of `point_names`."""
     x, y = limb.base_position
     direction = limb.base_angle
-    found = []
+    positions = []
     for segment, turn in zip(limb.segments, angle, strict=True):
         direction += float(turn)
         distance = segment.com_distance
-        found += [(x, y), (point_x(x, distance, direction), point_y(y, distance, direction))]
+        positions += [(x, y), (point_x(x, distance, direction), point_y(y, distance, direction))]
         x, y = point_x(x, segment.length, direction), point_y(y, segment.length, direction)
-    return [*found, (x, y)]
+    return [*positions, (x, y)]

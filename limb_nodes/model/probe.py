@@ -30,7 +30,7 @@ class Probe:
 
     given: the variables that will be given at every point.
     constants: variables that stay the same.
-    Raises BrokenLaw where an equation uses what is neither given nor defined, or where the
+    Raises BrokenLaw if an equation uses what is neither given nor defined, or if the
     equations define each other.
     """
 
@@ -71,7 +71,7 @@ class Probe:
 
 
 def value_of(step: Step, values: Mapping[str, float]) -> float:
-    """The value of an equation; NaN where its arithmetic fails, as when it is compiled."""
+    """The value of an equation; NaN if its arithmetic fails, as when it is compiled."""
     try:
         value = step.equation.function(*[values[symbol] for symbol in step.symbols])
     except (ArithmeticError, ValueError):
@@ -126,9 +126,9 @@ def states_fault(chosen: ChosenLaw, probe: Probe, points: Iterable[tuple[dict[st
         tried += [{**start, state.name: low}, {**start, state.name: high}]
     for point, words in points:
         for states in tried:
-            found = probe.at(**{**states, **point})
+            values = probe.at(**{**states, **point})
             for state in law.states:
-                if not math.isfinite(found[state.rate]):
+                if not math.isfinite(values[state.rate]):
                     at = ", ".join(f"{name} {value:.4g}" for name, value in states.items())
-                    return f"{state.rate} is {number(found[state.rate])} at {at}{words}; it must be finite"
+                    return f"{state.rate} is {number(values[state.rate])} at {at}{words}; a finite rate is needed"
     return ""

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
-# Modules that came from beside a limb's file, with the text that they were made from.
+# Modules that came from beside a limb's file, with their text at the time.
 _texts: dict[str, str] = {}
 
 
@@ -23,7 +23,7 @@ def import_user_module(name: str, folders: Sequence[Path]) -> ModuleType:
     """The module of a name, from one of the folders or installed.
 
     Another limb may have brought a module of the same name, and the user may have edited the file
-    since: the module is made anew where its file or text differs. Raises ImportError, or what the
+    since: the module is imported again if its file or text differs. Raises ImportError, or what the
     module's code raises.
     """
     path = next((p for folder in folders for p in module_files(folder, name) if p.is_file()), None)

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from limb_nodes.analysis.trajectory import Trajectory
-from limb_nodes.analysis.verification import CASES, balanced_angle, examine, frequency, highest_turn, lowest_turn
+from limb_nodes.analysis.verification import CASES, balanced_angle, frequency, highest_turn, lowest_turn, measure
 from limb_nodes.cli import main
 from limb_nodes.commands.verify import write_limb
 from limb_nodes.errors import UserError
@@ -189,7 +189,7 @@ def test_a_wrong_limb_fails(capsys, tmp_path, case, right, wrong, failing):
 
 def test_a_case_that_cannot_be_solved_fails_without_a_number():
     case = CASES[0]
-    for finding in examine(case, "graph", None):
+    for finding in measure(case, "graph", None):
         assert not finding.passed
         assert finding.plain()["found"] is None
 

@@ -46,9 +46,9 @@ def test_pictures_of_three_kinds(
         (["-o", "{tmp}/no/a.png"], "--out is {tmp}/no/a.png; a folder that exists is needed, unlike {tmp}/no"),
         (["-o", "{tmp}/a.png", "--dpi", "0"], "--dpi is 0; a number >= 10 and <= 1200 is needed"),
         (["-o", "{tmp}/a.png", "--dpi", "nan"], "--dpi is nan; a number >= 10 and <= 1200 is needed"),
-        (["-o", "{tmp}/a.png", "--from", "2"], "--from 2: {bag} ends at 1 s; must be less"),
+        (["-o", "{tmp}/a.png", "--from", "2"], "--from is 2; a number < 1 in s is needed, the end of {bag}"),
         (["-o", "{tmp}/a.png", "--reference", "{tmp}/x"], "{tmp}/x: no such bag"),
-        (["-o", "{tmp}/a.png", "--namespace", "x"], "{bag}: --namespace x: no such topics in the bag; it has /"),
+        (["-o", "{tmp}/a.png", "--namespace", "x"], "{bag}: --namespace is x; one of / is needed"),
     ],
 )
 def test_mistakes_are_one_line(

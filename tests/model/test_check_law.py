@@ -253,15 +253,23 @@ def said(limb, place: str, law: str) -> str:
         (
             "force_length",
             "negative",
-            "force_length_factor is -0.01667 at fibre_length_norm 1.51667; it must be at least 0",
+            "force_length_factor is -0.01667 at fibre_length_norm 1.51667; a number >= 0 is needed",
         ),
-        ("force_length", "root", "force_length_factor is not a number at fibre_length_norm 1.51667; it must be finite"),
+        (
+            "force_length",
+            "root",
+            "is not a number at fibre_length_norm 1.51667; a finite number is needed",
+        ),
         (
             "force_length",
             "power",
-            "force_length_factor is not a number at fibre_length_norm 1.51667; it must be finite",
+            "is not a number at fibre_length_norm 1.51667; a finite number is needed",
         ),
-        ("force_length", "pole", "force_length_factor is not a number at fibre_length_norm 1; it must be finite"),
+        (
+            "force_length",
+            "pole",
+            "is not a number at fibre_length_norm 1; a finite number is needed",
+        ),
         (
             "force_length",
             "array",
@@ -271,9 +279,13 @@ def said(limb, place: str, law: str) -> str:
         ("force_length", "unknown_name", "line 39: STIFFNESS is not allowed in a law"),
         ("force_length", "unknown_variable", "uses fibre_size; a law of force_length is given fibre_length_norm, "),
         ("force_length", "nothing", "equation nothing returns None, not a number"),
-        ("passive_force", "falling", "falls between fibre_length_norm 0 and 0.0166667; it must rise"),
-        ("force_frequency", "offset", "force_frequency_factor is 0.1 at stimulation_frequency 0 Hz; it must be 0"),
-        ("force_frequency", "hump", "falls between stimulation_frequency 11.3333 and 11.5 Hz; it must rise"),
+        ("passive_force", "falling", "falls between fibre_length_norm 0 and 0.0166667; a law that rises is needed"),
+        ("force_frequency", "offset", "force_frequency_factor is 0.1 at stimulation_frequency 0 Hz; 0 is needed"),
+        (
+            "force_frequency",
+            "hump",
+            "between stimulation_frequency 11.3333 and 11.5 Hz; a law that rises is needed",
+        ),
     ],
 )
 def test_unit_law_is_refused_with_the_place(limb, key, law, words):
@@ -288,8 +300,11 @@ def test_unit_law_is_refused_with_the_place(limb, key, law, words):
             "sarcomere_force has a kink at sarcomere_velocity 0 m/s: its slope is -5.05e-07 below and -5e-07 above",
         ),
         ("jumping", "sarcomere_force jumps from 1.001e-12 over 1.001e-12 to 1e-12 at sarcomere_velocity 0 m/s"),
-        ("rising", "sarcomere_force rises between sarcomere_velocity 1.8e-06 and 2.25e-06 m/s; it must fall"),
-        ("root", "sarcomere_force is not a number at sarcomere_velocity 2.025e-05 m/s; it must be finite"),
+        (
+            "rising",
+            "sarcomere_force rises between sarcomere_velocity 1.8e-06 and 2.25e-06 m/s; a law that falls is needed",
+        ),
+        ("root", "sarcomere_force is not a number at sarcomere_velocity 2.025e-05 m/s; a finite number is needed"),
         ("lagging", "lagged_rate is not a number at lagged 1, sarcomere_velocity -2.7e-05 m/s"),
         ("stateless", "equation F uses lagged; a law of sarcomere is given sarcomere_length"),
         ("forceless", "it does not define sarcomere_force, which a law of sarcomere owes"),
@@ -305,7 +320,11 @@ def test_sarcomere_law_is_refused_with_the_place(limb, law, words):
     [
         ("tendon", "pushing", "tendon_velocity rises between tendon_length"),
         ("path", "inconsistent", "but the length shortens by 0.02 m/s"),
-        ("activation_dynamics", "inverted", "activation falls between excitation 0 and 0.05; it must rise"),
+        (
+            "activation_dynamics",
+            "inverted",
+            "falls between excitation 0 and 0.05; a law that rises is needed",
+        ),
     ],
 )
 def test_muscle_law_is_refused_with_the_place(limb, key, law, words):

@@ -196,13 +196,13 @@ CASES = {
         {("muscles", 1, "units", 0, "series_sarcomeres"): 2e5},
         "muscles[1].units[0].series_sarcomeres",
         "200000",
-        "that the joint allows",
+        "of the joint are needed",
     ),
     "fibres too short": (
         {("muscles", 1, "units", 0, "series_sarcomeres"): 1e4},
         "muscles[1].units[0].series_sarcomeres",
         "10000",
-        "that the joint allows",
+        "of the joint are needed",
     ),
     "tendon longer than the path": (
         {(*TENDON, "slack_length"): 0.5},
@@ -221,19 +221,24 @@ CASES = {
     "joint as list": ({(*MUSCLE, "joint"): ["elbow"]}, "muscles[0].joint", "['elbow']", "shoulder, elbow"),
     "role that is not there": ({(*MUSCLE, "role"): "bender"}, "muscles[0].role", "'bender'", "flexor, extensor"),
     "kind that is not there": ({(*UNIT, "kind"): "quick"}, "muscles[0].units[0].kind", "'quick'", "slow"),
-    "joints twice": ({(*SEGMENT, "joint"): "shoulder"}, "segments[1].joint", "'shoulder'", "unique"),
-    "muscles twice": ({("muscles", 1, "name"): "flexor"}, "muscles[1].name", "'flexor'", "unique"),
+    "joints twice": (
+        {(*SEGMENT, "joint"): "shoulder"},
+        "segments[1].joint",
+        "'shoulder'",
+        "name of its own is needed",
+    ),
+    "muscles twice": ({("muscles", 1, "name"): "flexor"}, "muscles[1].name", "'flexor'", "name of its own is needed"),
     "units twice": (
         {("muscles", 0, "units", 1): {"kind": "slow", "name": "first"}},
         "units[1].name",
         "'first'",
-        "unique",
+        "name of its own is needed",
     ),
     "units twice behind a count": (
         {("muscles", 0, "units"): [{"kind": "slow", "name": n, "count": c} for n, c in (("a", 3), ("b", 1), ("b", 1))]},
         "muscles[0].units[2].name",
         "'b'",
-        "unique",
+        "name of its own is needed",
     ),
     # Laws.
     "law that is not there": ({(*TENDON, "law"): "maxwell"}, "muscles[0].tendon.law", "'maxwell'", "rigid"),
@@ -251,7 +256,7 @@ CASES = {
         "'no_such:law'",
         "imported",
     ),
-    "module without the law": ({(*TENDON, "law"): "math:pi"}, "muscles[0].tendon.law", "'math:pi'", "no law"),
+    "module without the law": ({(*TENDON, "law"): "math:pi"}, "muscles[0].tendon.law", "'math:pi'", "a law is needed"),
     "module without a name": ({(*TENDON, "law"): ":x"}, "muscles[0].tendon.law", "':x'", "imported"),
     "law of another process": (
         {(*TENDON, "law"): "limb_nodes.levels.motor_unit.force_length:cheng"},

@@ -94,7 +94,7 @@ def test_an_edited_law_is_read_again(tmp_path):
     [
         ("import nowhere_to_be_found\n", "it cannot be imported: No module named 'nowhere_to_be_found'"),
         ("def gaussian(:\n", "it cannot be imported: "),
-        ("gaussian = 3\n", "gaussian in my_law is no law"),
+        ("gaussian = 3\n", "a law is needed, which gaussian in my_law is not"),
         (MY_LAW.replace("force_length", "passive_force"), "a law of passive_force; a law of force_length is needed"),
     ],
 )

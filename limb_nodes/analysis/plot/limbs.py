@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BONE, HELD, GHOST, JOINT = GREY, "#BBBBBB", LIGHT, WHITE
-# Part of the limb's reach that is drawn of what holds the base, where no muscle comes from further away.
+# Part of the limb's reach that is drawn of what holds the base, if no muscle comes from further away.
 BASE = 0.12
 
 

@@ -87,7 +87,7 @@ def muscle_names(run: BagSeries) -> tuple[str, ...]:
 
 
 def columns_of(run: BagSeries) -> list[Column]:
-    """The columns of a picture: one per joint, two where there is one joint; of envelopes alone, one per channel."""
+    """The columns of a picture: one per joint, two if there is one joint; of envelopes alone, one per channel."""
     if run.angle is None and run.torque is None and not run.muscles and run.frequency is None:
         return _envelope_columns(run)
     joints = _joints(run)
@@ -144,12 +144,12 @@ def _with_role(run: BagSeries, name: str) -> str:
 
 def _muscle_lines(run: BagSeries, series: Series, muscles: Sequence[str], factor: float = 1.0) -> tuple[Line, ...]:
     known = muscle_names(run)
-    found = []
+    lines = []
     for name in muscles:
         if name in series.names:
             colour, style = look_of(known.index(name))
-            found.append(Line(name, series.times, factor * series.column(name), colour, style))
-    return tuple(found)
+            lines.append(Line(name, series.times, factor * series.column(name), colour, style))
+    return tuple(lines)
 
 
 def _drive(run: BagSeries, muscles: Sequence[str]) -> Panel | None:
@@ -200,7 +200,7 @@ def _of_muscles(
 
 
 def _joint_lines(series: Series, joints: Sequence[str], label: str, factor: float = 1.0) -> list[Line]:
-    """A black line per joint, of different style and labelled with its name where there are several."""
+    """A black line per joint, of different style and labelled with its name if there are several."""
     there = [joint for joint in joints if joint in series.names]
     return [
         Line(
@@ -215,7 +215,7 @@ def _joint_lines(series: Series, joints: Sequence[str], label: str, factor: floa
 
 
 def _of_joint(text: str, joints: Sequence[str]) -> str:
-    """`text` with the joint's name, where that leaves room for a legend beside it."""
+    """`text` with the joint's name, if that leaves room for a legend beside it."""
     return f"{text} {joints[0]}" if len(joints) == 1 and len(joints[0]) <= 10 else text.split()[0]
 
 

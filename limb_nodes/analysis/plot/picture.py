@@ -190,7 +190,7 @@ def _bounds(axes: Axes, bounds: tuple[float, float]) -> None:
 
 
 def _raster(axes: Axes, raster: Raster, run: BagSeries) -> None:
-    """Frequencies as colours; white where a unit is silent."""
+    """Frequencies as colours; white while a unit is silent."""
     import matplotlib
 
     axes.grid(False)

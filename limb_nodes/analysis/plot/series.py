@@ -13,7 +13,7 @@ from ruamel.yaml.error import YAMLError
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.bags.types import RUN_INFO
-from limb_nodes.errors import UserError
+from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.model import Limb, parse_limb
@@ -46,12 +46,12 @@ class Series:
 
 @dataclass(frozen=True)
 class BagSeries:
-    """What a bag holds. A series is None, or missing in `muscles`, where the bag lacks its topic.
+    """What a bag holds. A series is None, or missing in `muscles`, if the bag lacks its topic.
 
     limb: None in a bag without one, such as an envelope bag. drive: activations, or the envelopes of a bag without
     activations (`is_envelope`). owners: the muscle of each motor unit of `frequency`. muscles: by field of MuscleState.
     angle, velocity, torque: by joint, rad, rad/s, N m. reference: recorded angles by joint, rad. start, end: s.
-    source: what the bag was made of, where it holds no limb. notes: what a person should know, one sentence each.
+    source: what the bag was made of, if it holds no limb. notes: what a person should know, one sentence each.
     """
 
     path: Path
@@ -98,13 +98,13 @@ class _Bag:
         """The part of a field that is to be drawn."""
         if field not in table:
             raise UserError(
-                f"{self.reader.path}: topic {self.prefix}/{topic} has no field {field}; was the bag written by limb?"
+                f"{self.reader.path}: topic {self.prefix}/{topic} has no field {field}; a bag of limb's is needed"
             )
         values = table[field]
         if values.shape[1:] != (len(names),):
             raise UserError(
-                f"{self.reader.path}: topic {self.prefix}/{topic}: {len(names)} names and "
-                f"{'x'.join(map(str, values.shape[1:])) or 'no'} values of {field}; one each is needed"
+                f"{self.reader.path}: topic {self.prefix}/{topic} has {len(names)} names and "
+                f"{'x'.join(map(str, values.shape[1:])) or 'no'} values of {field}; as many of both are needed"
             )
         times = table["time"]
         # Half a nanosecond of slack, for times are whole nanoseconds as floating-point seconds.
@@ -116,7 +116,7 @@ class _Bag:
         return Series(names, times[keep], values[keep].astype(np.float64))
 
     def info(self) -> dict[str, Any]:
-        """The bag's run_info, empty where there is none."""
+        """The bag's run_info, empty if there is none."""
         topic = f"{self.prefix}/{RUN_INFO}"
         if not self.reader.has(topic):
             return {}
@@ -140,7 +140,7 @@ def read_series(
 
     Args:
         path: the bag.
-        namespace: of the limb, where the bag holds several.
+        namespace: of the limb, if the bag holds several.
         start: first time, s; None for the bag's first.
         end: last time, s; None for the bag's last.
         reference: a bag with recorded angles (`reference_angle`); None takes those of the bag itself.
@@ -153,18 +153,14 @@ def read_series(
         bag = _Bag(reader, namespace, start, end)
         info = bag.info()
         limb, notes = _limb(info, str(path))
-        found: dict[str, Any] = {}
-        _read_drive(bag, found)
-        _read_units(bag, found)
-        _read_muscles(bag, found)
-        _read_joints(bag, found)
+        parts = {**_drive(bag), **_units(bag), **_muscles(bag), **_joints(bag)}
         if reference is None and bag.has(ANGLE_TOPIC):
             table = bag.table(ANGLE_TOPIC)
-            found["reference"] = bag.cut(ANGLE_TOPIC, table, _names(table["name"]), "position")
+            parts["reference"] = bag.cut(ANGLE_TOPIC, table, _names(table["name"]), "position")
     if reference is not None:
-        found["reference"] = _read_reference(reference, start, end)
-    if "reference" in found and "angle" in found:
-        found["reference"] = _matched(found["reference"], found["angle"].names, reference, notes)
+        parts["reference"] = _recorded(reference, start, end)
+    if "reference" in parts and "angle" in parts:
+        parts["reference"] = _matched(parts["reference"], parts["angle"].names, reference, notes)
     first, last = _shown(path, bag, start, end)
     return BagSeries(
         Path(path),
@@ -175,24 +171,24 @@ def read_series(
         last,
         source=str(info.get("source") or ""),
         notes=tuple(notes),
-        **found,
+        **parts,
     )
 
 
 def _check_times(start: float | None, end: float | None) -> None:
-    for option, value in (("--from", start), ("--to", end)):
+    for name, value in (("start", start), ("end", end)):
         if value is not None and not np.isfinite(value):
-            raise UserError(f"{option} {value:g}: must be a number of seconds")
+            raise FieldError(name, f"is {value:g}; a finite number in s is needed")
     if start is not None and end is not None and not start < end:
-        raise UserError(f"--from {start:g} --to {end:g}: the end must be later than the start")
+        raise FieldError("end", f"is {end:g}; a number > the start ({start:g}) in s is needed")
 
 
 def _shown(path: str | Path, bag: _Bag, start: float | None, end: float | None) -> tuple[float, float]:
     """First and last time of the picture."""
     if start is not None and start >= bag.last:
-        raise UserError(f"--from {start:g}: {path} ends at {bag.last:g} s; must be less")
+        raise FieldError("start", f"is {start:g}; a number < {bag.last:g} in s is needed, the end of {path}")
     if end is not None and end <= bag.first:
-        raise UserError(f"--to {end:g}: {path} starts at {bag.first:g} s; must be more")
+        raise FieldError("end", f"is {end:g}; a number > {bag.first:g} in s is needed, the start of {path}")
     first = bag.first if start is None else max(start, bag.first)
     last = bag.last if end is None else min(end, bag.last)
     return first, last
@@ -209,16 +205,16 @@ def _prefix(reader: BagReader, namespace: str) -> str:
     there = ", ".join(sorted(prefix.strip("/") or "/" for prefix in drawn))
     if not drawn:
         raise UserError(
-            f"{reader.path}: nothing to draw, no message on any of {', '.join(DRAWN)}; "
-            f"the bag has {', '.join(reader.topics) or 'no topic'}"
+            f"{reader.path}: has {', '.join(reader.topics) or 'no topic'}, nothing to draw; "
+            f"a message on {' or '.join(DRAWN)} is needed"
         )
     if namespace:
         asked = f"/{namespace.strip('/')}".rstrip("/")
         if asked not in drawn:
-            raise UserError(f"{reader.path}: --namespace {namespace}: no such topics in the bag; it has {there}")
+            raise FieldError("namespace", f"is {namespace}; one of {there} is needed", str(reader.path))
         return asked
     if len(drawn) > 1:
-        raise UserError(f"{reader.path}: topics of several limbs; --namespace must be one of {there}")
+        raise FieldError("namespace", f"is empty; one of {there} is needed", str(reader.path))
     return drawn.pop()
 
 
@@ -242,68 +238,72 @@ def _names(texts: npt.NDArray[Any]) -> tuple[str, ...]:
     return tuple(str(text) for text in texts)
 
 
-def _read_drive(bag: _Bag, found: dict[str, Any]) -> None:
+def _drive(bag: _Bag) -> dict[str, Any]:
     topic = next((topic for topic in ("activation", ENVELOPE_TOPIC) if bag.has(topic)), None)
-    if topic is not None:
-        table = bag.table(topic)
-        found["drive"] = bag.cut(topic, table, _names(table["name"]), "activation")
-        found["is_envelope"] = topic == ENVELOPE_TOPIC
+    if topic is None:
+        return {}
+    table = bag.table(topic)
+    drive = bag.cut(topic, table, _names(table["name"]), "activation")
+    return {"drive": drive, "is_envelope": topic == ENVELOPE_TOPIC}
 
 
-def _read_units(bag: _Bag, found: dict[str, Any]) -> None:
+def _units(bag: _Bag) -> dict[str, Any]:
     topic = "motor_unit_state"
-    if bag.has(topic):
-        table = bag.table(topic)
-        found["frequency"] = bag.cut(topic, table, _names(table["unit"]), "stimulation_frequency")
-        found["owners"] = _names(table["muscle"])
+    if not bag.has(topic):
+        return {}
+    table = bag.table(topic)
+    frequency = bag.cut(topic, table, _names(table["unit"]), "stimulation_frequency")
+    return {"frequency": frequency, "owners": _names(table["muscle"])}
 
 
-def _read_muscles(bag: _Bag, found: dict[str, Any]) -> None:
+def _muscles(bag: _Bag) -> dict[str, Any]:
     topic = "muscle_state"
-    if bag.has(topic):
-        table = bag.table(topic)
-        names = _names(table["name"])
-        found["muscles"] = {field: bag.cut(topic, table, names, field) for field in MUSCLE_FIELDS}
+    if not bag.has(topic):
+        return {}
+    table = bag.table(topic)
+    names = _names(table["name"])
+    return {"muscles": {field: bag.cut(topic, table, names, field) for field in MUSCLE_FIELDS}}
 
 
-def _read_joints(bag: _Bag, found: dict[str, Any]) -> None:
+def _joints(bag: _Bag) -> dict[str, Any]:
+    series = {}
     if bag.has("joint_torque"):
         table = bag.table("joint_torque")
-        found["torque"] = bag.cut("joint_torque", table, _names(table["joint"]), "torque")
+        series["torque"] = bag.cut("joint_torque", table, _names(table["joint"]), "torque")
     if bag.has("joint_states"):
         table = bag.table("joint_states")
         names = _names(table["name"])
-        found["angle"] = bag.cut("joint_states", table, names, "position")
+        series["angle"] = bag.cut("joint_states", table, names, "position")
         # JointState may leave velocities out.
         if table["velocity"].shape[1:] == (len(names),):
-            found["velocity"] = bag.cut("joint_states", table, names, "velocity")
+            series["velocity"] = bag.cut("joint_states", table, names, "velocity")
+    return series
 
 
-def _read_reference(path: str | Path, start: float | None, end: float | None) -> Series:
+def _recorded(path: str | Path, start: float | None, end: float | None) -> Series:
+    """The recorded angles of a bag, whose time counts from its first sample on, as that of a run does."""
     with BagReader(path) as reader:
         if not reader.has(ANGLE_TOPIC):
-            raise UserError(
-                f"--reference {path}: no message on {ANGLE_TOPIC}; the bag has {', '.join(reader.topics) or 'no topic'}"
-            )
+            topics = ", ".join(reader.topics) or "no topic"
+            raise FieldError("reference", f"is {path}, which has {topics}; a message on {ANGLE_TOPIC} is needed")
         bag = _Bag(reader, "", start, end)
-        # A run counts its time from the recording's first sample on.
         bag.offset = float(reader.table(f"{bag.prefix}/{ANGLE_TOPIC}")["time"][0])
         table = bag.table(ANGLE_TOPIC)
         return bag.cut(ANGLE_TOPIC, table, _names(table["name"]), "position")
 
 
-def _matched(found: Series, joints: tuple[str, ...], given: str | Path | None, notes: list[str]) -> Series | None:
+def _matched(angles: Series, joints: tuple[str, ...], given: str | Path | None, notes: list[str]) -> Series | None:
     """The recorded angles under the names of the joints they belong to."""
-    if len(found.names) == len(joints) == 1:
-        return Series(joints, found.times, found.values)
-    same = [name for name in found.names if name in joints]
+    if len(angles.names) == len(joints) == 1:
+        return Series(joints, angles.times, angles.values)
+    same = [name for name in angles.names if name in joints]
     if same:
-        return Series(tuple(same), found.times, np.stack([found.column(name) for name in same], axis=1))
-    line = (
-        f"recorded angles {', '.join(found.names)}: none is named after a joint, {', '.join(joints)}; "
-        f"name them with `limb emg --angle {found.names[0]}={joints[0]}`"
+        return Series(tuple(same), angles.times, np.stack([angles.column(name) for name in same], axis=1))
+    recorded = ", ".join(angles.names)
+    wish = (
+        f"the name of a joint ({', '.join(joints)}) is needed, as by `limb emg --angle {angles.names[0]}={joints[0]}`"
     )
     if given is not None:
-        raise UserError(f"--reference {given}: {line}")
-    notes.append(line)
+        raise FieldError("reference", f"is {given}, whose angles are {recorded}; {wish}")
+    notes.append(f"the recorded angles {recorded} are not drawn; {wish}")
     return None

@@ -39,7 +39,7 @@ def gaps_after(times: FloatArray) -> Indices:
 
 
 def pooled(times: FloatArray, values: FloatArray, bins: int = BINS) -> FloatArray:
-    """The highest value of each of at most `bins` stretches of equal time, [bins, columns]; NaN where none is."""
+    """The highest value of each of at most `bins` stretches of equal time, [bins, columns]; NaN if it has none."""
     steps = np.diff(times)
     if not steps.size or not steps.max() > 0:
         return values[:1]
@@ -49,17 +49,17 @@ def pooled(times: FloatArray, values: FloatArray, bins: int = BINS) -> FloatArra
     count = min(bins, max(1, round(span / usual)))
     places = np.minimum(((times - times[0] + 0.5 * usual) / span * count).astype(np.intp), count - 1)
     starts = np.flatnonzero(np.diff(places, prepend=-1))
-    found = np.full((count, values.shape[1]), np.nan)
-    found[places[starts]] = np.maximum.reduceat(values, starts, axis=0)
-    return found
+    highest = np.full((count, values.shape[1]), np.nan)
+    highest[places[starts]] = np.maximum.reduceat(values, starts, axis=0)
+    return highest
 
 
 def _extremes(times: FloatArray, values: FloatArray, bins: int) -> Indices:
     """Index of the lowest and of the highest value of each stretch that has one."""
     edges = np.searchsorted(times, np.linspace(times[0], times[-1], bins + 1)[1:-1])
     low, high = np.where(np.isnan(values), np.inf, values), np.where(np.isnan(values), -np.inf, values)
-    found: list[int] = []
+    indices: list[int] = []
     for start, end in zip([0, *edges], [*edges, len(times)], strict=True):
         if start < end:
-            found += [start + int(low[start:end].argmin()), start + int(high[start:end].argmax())]
-    return np.array(found, dtype=np.intp)
+            indices += [start + int(low[start:end].argmin()), start + int(high[start:end].argmax())]
+    return np.array(indices, dtype=np.intp)

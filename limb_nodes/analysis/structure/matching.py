@@ -18,7 +18,7 @@ class Parts(Generic[Node]):
     """Coarse Dulmage-Mendelsohn decomposition.
 
     over: equations and unknowns of the part with too many equations; under: of the part with too few. All four are
-    empty where every equation can be matched with an unknown of its own and no unknown is left.
+    empty if every equation can be matched with an unknown of its own and no unknown is left.
     """
 
     over: tuple[tuple[int, ...], tuple[Node, ...]]
@@ -64,7 +64,7 @@ def dulmage_mendelsohn(equations: Sequence[Sequence[Node]], unknowns: Sequence[N
 
 
 def matching(rows: Sequence[Sequence[int]], columns: int) -> tuple[list[int], list[int]]:
-    """A maximum matching: the column of each row and the row of each column, -1 where there is none."""
+    """A maximum matching: the column of each row and the row of each column, -1 if there is none."""
     if not rows or not columns:
         return [-1] * len(rows), [-1] * columns
     indices = np.array([j for row in rows for j in row], dtype=np.int32)

@@ -28,7 +28,7 @@ class Matrix:
     entries: dict[tuple[str, str], str]
 
     def heading(self, column: str) -> str:
-        """The symbol, in parentheses where it is given from outside."""
+        """The symbol, in parentheses if it is given from outside."""
         return f"({column})" if column in self.external else column
 
 
@@ -59,6 +59,6 @@ def structure_matrix(system: EquationSet) -> Matrix:
 
 
 def place(label: str) -> tuple[int, int]:
-    """Where an equation stands in the report; those without a number come last."""
-    found = re.match(r"(\d+)\.(\d+)", label)
-    return (int(found.group(1)), int(found.group(2))) if found else (1000, 0)
+    """Chapter and number of an equation in the report; those without a number come last."""
+    number = re.match(r"(\d+)\.(\d+)", label)
+    return (int(number[1]), int(number[2])) if number else (1000, 0)

@@ -36,14 +36,14 @@ def rate_equations(law: Law) -> set[str]:
     """What a law defines on the way to the rates of its states, apart from what it owes to its level."""
     definitions = {item.defines: item for item in law.equations}
     owed = CONTRACTS[law.process].defines
-    found: set[str] = set()
+    names: set[str] = set()
     waiting = [state.rate for state in law.states]
     while waiting:
         name = waiting.pop()
-        if name in definitions and name not in found and name not in owed:
-            found.add(name)
+        if name in definitions and name not in names and name not in owed:
+            names.add(name)
             waiting += definitions[name].uses
-    return found
+    return names
 
 
 def level_of(law: Law, defines: str) -> str:

@@ -2,7 +2,7 @@
 
 C. C. Pantelides, The consistent initialization of differential-algebraic systems, SIAM J. Sci. Stat. Comput. 9 (1988)
 213. The index that follows from the numbers of differentiations is that of J. D. Pryce, BIT 41 (2001) 364: the
-greatest number, and one more where an unknown is then still algebraic. So ordinary differential equations have index
+greatest number, and one more if an unknown is then still algebraic. So ordinary differential equations have index
 0, algebraic equations and semi-explicit systems that can be solved for their algebraic unknowns have index 1.
 """
 
@@ -62,8 +62,8 @@ def pantelides(equations: Sequence[Mapping[Node, int]]) -> Offsets[Node]:
     limit = sum(highest.values()) + len(equations)
     for start in range(len(equations)):
         for _ in range(limit + 2):
-            found, rows, nodes = augment(start, equations, times, highest, solved)
-            if found:
+            matched, rows, nodes = augment(start, equations, times, highest, solved)
+            if matched:
                 break
             at_times = tuple((row, times[row]) for row in sorted(rows))
             constraints.append((at_times, tuple((node, highest[node]) for node in nodes)))

@@ -31,7 +31,7 @@ class Relation:
     """One scalar equation.
 
     number: that of the report, or a name. level: the level or sub-level it belongs to.
-    process: of the law that brings the equation, empty where it belongs to the level itself.
+    process: of the law that brings the equation, empty if it belongs to the level itself.
     offered: inputs of the level that a law of this process may use and this one does not.
     """
 
@@ -57,10 +57,10 @@ class Relation:
 
     def incidence(self) -> dict[Variable, int]:
         """Every variable of the equation with its highest derivative in it, the defined one first."""
-        found: dict[Variable, int] = {}
+        highest: dict[Variable, int] = {}
         for variable, order in (self.defines, *self.uses):
-            found[variable] = max(order, found.get(variable, 0))
-        return found
+            highest[variable] = max(order, highest.get(variable, 0))
+        return highest
 
     @property
     def differential(self) -> bool:
@@ -156,13 +156,13 @@ def substitute(relations: Iterable[Relation], names: Iterable[str]) -> list[Rela
     definitions = {r.defines.variable: r for r in relations if r.defines.variable.name in gone}
 
     def expanded(terms: Iterable[Term]) -> list[Term]:
-        found: dict[Term, None] = {}
+        result: dict[Term, None] = {}
         for term in terms:
             if term.variable in definitions:
                 inner = expanded(definitions[term.variable].uses)
-                found.update(dict.fromkeys(Term(v, order + term.order) for v, order in inner))
+                result.update(dict.fromkeys(Term(v, order + term.order) for v, order in inner))
             else:
-                found[term] = None
-        return list(found)
+                result[term] = None
+        return list(result)
 
     return [replace(r, uses=tuple(expanded(r.uses))) for r in relations if r.defines.variable not in definitions]

@@ -82,16 +82,16 @@ GREEK = {"α": r"\alpha", "β": r"\beta", "θ": r"\theta", "ω": r"\omega"}
 
 
 def symbol(name: str) -> str:
-    """The symbol of a variable, its own name where the report has none."""
+    """The symbol of a variable, its own name if the report has none."""
     return SYMBOLS.get(name, name)
 
 
 def mathtext(text: str) -> str:
     """A symbol for matplotlib: one letter with sub- and superscripts in italics, all else upright."""
-    found = re.fullmatch(r"(\(?)(-?)([^\W\d_]{1,4})(_[^^*]+)?(\^.+)?(\*?)(\)?)", text)
-    if not found:
+    parts = re.fullmatch(r"(\(?)(-?)([^\W\d_]{1,4})(_[^^*]+)?(\^.+)?(\*?)(\)?)", text)
+    if not parts:
         return text
-    opening, sign, base, low, high, star, closing = found.groups()
+    opening, sign, base, low, high, star, closing = parts.groups()
     letter = GREEK.get(base, base if len(base) == 1 else rf"\mathrm{{{base}}}")
     low = rf"_{{\mathrm{{{low[1:]}}}}}" if low else ""
     if high == "^s":

@@ -13,7 +13,7 @@ from limb_nodes.analysis.structure.symbols import symbol
 from limb_nodes.foundation.text_table import aligned
 
 TIMES = {1: "once", 2: "twice"}
-# Laws that tell the levels of one name apart, where they are many.
+# Laws that tell the levels of one name apart; of the others, all are named.
 TELLING = {ASSEMBLED: ("sarcomere", "tendon", "aponeurosis"), "muscle": ("path", "aponeurosis")}
 KINDS = {
     "algebraic equations": "algebraic",
@@ -76,7 +76,7 @@ def summary(findings: Iterable[Findings], width: int) -> list[str]:
 
 
 def level_lines(one: Findings, width: int, every_matrix: bool) -> list[str]:
-    """What is found about one level."""
+    """What the structure of one level tells."""
     system = one.system
     laws = "; ".join(f"{process.replace('_', ' ')}: {law}" for process, law in system.laws.items())
     lines = [system.title, "=" * len(system.title)]
@@ -187,19 +187,19 @@ def spelled(variable: Variable) -> str:
 
 
 def shortened(text: str) -> str:
-    """A list of names, cut where it is long."""
+    """A list of names, cut if it is long."""
     names = text.split(", ")
     more = len(names) - LONGEST_LIST
     return text if more <= 0 else f"{', '.join(names[:LONGEST_LIST])} and {more} more"
 
 
 def counted(texts: Sequence[str]) -> str:
-    """Texts, each once, with how often it occurs where that is more than once."""
+    """Texts, each once, with how often it occurs if that is more than once."""
     return ", ".join(f"{text}{TIED}[{count}]" if count > 1 else text for text, count in Counter(texts).items())
 
 
 def matrix_lines(matrix: Matrix, width: int) -> list[str]:
-    """The matrix; where it is wider than `width`, several tables, without the rows that are empty there."""
+    """The matrix; if it is wider than `width`, several tables, without the rows that are empty there."""
     head = max(len(row_heading(row)) for row in matrix.rows)
     marks = {key: MARKS[mark] for key, mark in matrix.entries.items()}
     tables: list[list[str]] = [[]]

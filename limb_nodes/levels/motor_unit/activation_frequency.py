@@ -54,7 +54,7 @@ def cheng(
     """Force-frequency factor (1): 1 - exp(-(f_eff/(a_f n_f))^n_f), n_f = n_f0 + n_f1 (1/L - 1).
 
     A long fibre needs a lower frequency than a short one. The exponent stays above 0.1: beyond
-    1.7 optimal lengths, where the filaments no longer overlap, it would turn negative.
+    1.7 optimal lengths, at which the filaments no longer overlap, it would turn negative.
     """
     if stimulation_frequency <= 0.0:
         return 0.0

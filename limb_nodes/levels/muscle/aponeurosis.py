@@ -23,7 +23,7 @@ def pennation_angle(muscle_length: float, aponeurosis_length: float, area: float
     """Angle (rad) between aponeurosis and fibres at which the triangle has the given area.
 
     The form of 2.51 that also tells an obtuse angle: its sine is A/(l_A l_F) and its cosine
-    (sqrt(l_M^2 l_A^2 - A^2) - l_A^2)/(l_A l_F). Raises ValueError (NaN where compiled) if the two
+    (sqrt(l_M^2 l_A^2 - A^2) - l_A^2)/(l_A l_F). Raises ValueError (NaN if compiled) if the two
     lengths cannot span the area.
     """
     spanned = muscle_length * aponeurosis_length
