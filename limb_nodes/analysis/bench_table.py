@@ -57,7 +57,7 @@ class Row:
     last: float
 
 
-def summary(record: BenchRecord) -> list[Row]:
+def summary_rows(record: BenchRecord) -> list[Row]:
     """The quantities that a person wants to see first; lengths in mm, angles in degrees."""
     rows: list[Row] = []
 
@@ -91,7 +91,7 @@ def extent(values: FloatArray) -> dict[str, float]:
 def summary_text(record: BenchRecord) -> str:
     """The summary for the terminal."""
     rows = [("", "unit", "first", "lowest", "highest", "last")]
-    for row in summary(record):
+    for row in summary_rows(record):
         first, lowest, highest, last = (f"{value:.5g}" for value in (row.first, row.lowest, row.highest, row.last))
         rows.append((row.name, row.unit, first, lowest, highest, last))
     peak = int(record.force.argmax())

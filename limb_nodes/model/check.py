@@ -66,7 +66,7 @@ def check_geometry(file: str, muscle: Muscle, segment: Segment) -> None:
     if muscle.laws["aponeurosis"].law.states:
         check_triangle(file, muscle, longest)
         return
-    shortest, longest = (fibre_length(muscle, max(0.0, length)) for length in (shortest, longest))
+    shortest, longest = (fibre_length_of(muscle, max(0.0, length)) for length in (shortest, longest))
     for index, unit in enumerate(muscle.units):
         sarcomere = unit.laws["sarcomere"].values
         series = unit.values["series_sarcomeres"]
@@ -81,7 +81,7 @@ def check_geometry(file: str, muscle: Muscle, segment: Segment) -> None:
             )
 
 
-def fibre_length(muscle: Muscle, muscle_length: float) -> float:
+def fibre_length_of(muscle: Muscle, muscle_length: float) -> float:
     """Fibre length (m) at a muscle length, for an aponeurosis without states."""
     chosen = muscle.laws["aponeurosis"]
     probe = Probe(chosen, given(chosen), {"muscle_velocity": 0.0, "total_fibre_force": 0.0})

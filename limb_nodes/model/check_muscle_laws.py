@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from limb_nodes.model.chosen import ChosenLaw
-from limb_nodes.model.curve_checks import curve_fault, grid, place
+from limb_nodes.model.curve_checks import curve_fault, grid, point_text
 from limb_nodes.model.probe import Probe, given, initial_states, states_fault
 
 FORCES = [0.0, 1.0, 10.0, 100.0, 1000.0]
@@ -34,7 +34,7 @@ def path_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
         velocity = point["muscle_tendon_velocity"]
         if abs(shortening - velocity) > 1e-5 * (abs(shortening) + abs(velocity)) + 1e-9:
             return (
-                f"muscle_tendon_velocity is {velocity:.6g} m/s at {place(variable, angle)} and 1 rad/s, "
+                f"muscle_tendon_velocity is {velocity:.6g} m/s at {point_text(variable, angle)} and 1 rad/s, "
                 f"but the length shortens by {shortening:.6g} m/s"
             )
     return ""
@@ -54,13 +54,13 @@ def tendon_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
     lengths = grid(low, high, 40)
     for pull in pulls[::2]:
         velocities = [probe.at(**{**states, "tendon_force": pull, variable: length})[name] for length in lengths]
-        words = f" and {place('tendon_force', pull)}"
+        words = f" and {point_text('tendon_force', pull)}"
         fault = curve_fault(name, variable, lengths, velocities, direction=-1, suffix=words)
         if fault:
             return fault
     for length in lengths[::20]:
         velocities = [probe.at(**{**states, "tendon_force": pull, variable: length})[name] for pull in pulls]
-        words = f" and {place(variable, length)}"
+        words = f" and {point_text(variable, length)}"
         fault = curve_fault(name, "tendon_force", pulls, velocities, direction=-1, suffix=words)
         if fault:
             return fault
@@ -79,7 +79,7 @@ def aponeurosis_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
         lengths = [max(optimal, 2.0 * max(states.values()))]
     for length in lengths:
         points = [probe.at(**states, muscle_length=length, total_fibre_force=force) for force in FORCES]
-        words = f" and {place('muscle_length', length)}"
+        words = f" and {point_text('muscle_length', length)}"
         for name, direction, least in (
             ("muscle_force", 1, 0.0),
             ("fibre_velocity", 1, -math.inf),
@@ -100,7 +100,9 @@ def activation_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
     if not chosen.law.states:
         activations = [probe.at(excitation=excitation)["activation"] for excitation in excitations]
         return curve_fault("activation", "excitation", excitations, activations, direction=1, least=0.0)
-    points = (({"excitation": excitation}, f" and {place('excitation', excitation)}") for excitation in excitations)
+    points = (
+        ({"excitation": excitation}, f" and {point_text('excitation', excitation)}") for excitation in excitations
+    )
     return states_fault(chosen, probe, points)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from limb_nodes.levels.motor_unit.fibre import fibre_length_norm, frequency_norm
 from limb_nodes.levels.sarcomere.lengths import sarcomere_lengths
 from limb_nodes.model.chosen import ChosenLaw
-from limb_nodes.model.curve_checks import POINTS, curve_fault, grid, kink_fault, number, place
+from limb_nodes.model.curve_checks import POINTS, curve_fault, grid, kink_fault, number_text, point_text
 from limb_nodes.model.probe import Probe, given, states_fault
 
 # Greatest velocity at which a sarcomere law is checked, in its optimal lengths per second, about
@@ -21,7 +21,7 @@ def some_lengths(probe: Probe, fixed: dict[str, float]) -> Iterator[tuple[dict[s
     least, best, most = (fixed[f"{end}_sarcomere_length"] for end in ("minimum", "optimal", "maximum"))
     for length in (best, least, 0.5 * (least + best), 0.5 * (best + most), most) if depends else (best,):
         point = {"sarcomere_length": length, "fibre_length_norm": fibre_length_norm(length, least, best, most)}
-        yield point, f" and {place('sarcomere_length', length)}" if depends else ""
+        yield point, f" and {point_text('sarcomere_length', length)}" if depends else ""
 
 
 def sarcomere_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
@@ -37,7 +37,7 @@ def sarcomere_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
         points = (
             (
                 {**point, variable: velocity, "sarcomere_frequency": frequency},
-                f", {place(variable, velocity)}{words}",
+                f", {point_text(variable, velocity)}{words}",
             )
             for point, words in some_lengths(probe, fixed)
             for velocity in velocities[::4]
@@ -61,15 +61,15 @@ def sarcomere_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
 
 def force_length_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
     """Finite and not negative."""
-    return by_length(chosen, context, "force_length_factor", 0)
+    return length_factor_fault(chosen, context, "force_length_factor", 0)
 
 
 def passive_force_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
     """Rises with the length, not negative."""
-    return by_length(chosen, context, "passive_force_factor", 1)
+    return length_factor_fault(chosen, context, "passive_force_factor", 1)
 
 
-def by_length(chosen: ChosenLaw, context: dict[str, float], name: str, direction: int) -> str:
+def length_factor_fault(chosen: ChosenLaw, context: dict[str, float], name: str, direction: int) -> str:
     """A factor over normalised fibre lengths from 0 to 2, or the declared range."""
     variable = "fibre_length_norm"
     fixed = sarcomere_lengths(context)
@@ -81,7 +81,9 @@ def by_length(chosen: ChosenLaw, context: dict[str, float], name: str, direction
         length = least + norm * (best - least) if norm < 1.0 else best + (norm - 1.0) * (most - best)
         points.append({variable: norm, "sarcomere_length": length})
     if chosen.law.states:
-        return states_fault(chosen, probe, ((point, f" and {place(variable, point[variable])}") for point in points))
+        return states_fault(
+            chosen, probe, ((point, f" and {point_text(variable, point[variable])}") for point in points)
+        )
     values = [probe.at(**point)[name] for point in points]
     return curve_fault(name, variable, norms, values, direction=direction, least=0.0)
 
@@ -96,7 +98,7 @@ def force_frequency_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
     inputs = [{variable: f, "frequency_norm": frequency_norm(f, low, high)} for f in frequencies]
     if chosen.law.states:
         points = (
-            ({**point, **entry}, f" and {place(variable, entry[variable])}{words}")
+            ({**point, **entry}, f" and {point_text(variable, entry[variable])}{words}")
             for point, words in some_lengths(probe, fixed)
             for entry in inputs
         )
@@ -107,7 +109,7 @@ def force_frequency_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
         if fault:
             return fault
         if abs(values[0]) > 1e-9:
-            return f"{name} is {number(values[0])} at {place(variable, 0.0)}{words}; 0 is needed"
+            return f"{name} is {number_text(values[0])} at {point_text(variable, 0.0)}{words}; 0 is needed"
     return ""
 
 
@@ -121,13 +123,13 @@ def recruitment_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
         words = f" for unit_rank {rank:g} and unit_threshold {threshold:g}"
         unit = {"unit_rank": rank, "unit_threshold": threshold}
         if chosen.law.states:
-            points = (({**unit, variable: a}, f" and {place(variable, a)}{words}") for a in activations)
+            points = (({**unit, variable: a}, f" and {point_text(variable, a)}{words}") for a in activations)
             fault = states_fault(chosen, probe, points)
         else:
             values = [probe.at(**unit, activation=a)[name] for a in activations]
             fault = curve_fault(name, variable, activations, values, direction=1, least=0.0, suffix=words)
             if not fault and activations[0] == 0.0 and values[0] != 0.0:
-                fault = f"{name} is {number(values[0])} at {place(variable, 0.0)}{words}; 0 is needed"
+                fault = f"{name} is {number_text(values[0])} at {point_text(variable, 0.0)}{words}; 0 is needed"
         if fault:
             return fault
     return ""

@@ -28,12 +28,12 @@ def grid(low: float, high: float, count: int = POINTS) -> list[float]:
     return [low + (high - low) * index / count for index in range(count)] + [high]
 
 
-def number(value: float) -> str:
+def number_text(value: float) -> str:
     """A number in a message."""
     return "not a number" if math.isnan(value) else f"{value:.4g}"
 
 
-def place(variable: str, value: float) -> str:
+def point_text(variable: str, value: float) -> str:
     """A point in a message."""
     unit = UNITS.get(variable, "")
     return f"{variable} {value:.6g}{' ' + unit if unit else ''}"
@@ -52,9 +52,9 @@ def curve_fault(
     """The place at which a curve is not finite, goes below `least`, or against `direction` (-1 falls, 1 rises)."""
     for x, y in zip(xs, ys, strict=True):
         if not math.isfinite(y):
-            return f"{name} is {number(y)} at {place(variable, x)}{suffix}; a finite number is needed"
+            return f"{name} is {number_text(y)} at {point_text(variable, x)}{suffix}; a finite number is needed"
         if y < least:
-            return f"{name} is {number(y)} at {place(variable, x)}{suffix}; a number >= {least:g} is needed"
+            return f"{name} is {number_text(y)} at {point_text(variable, x)}{suffix}; a number >= {least:g} is needed"
     if direction:
         slack = ROUND_OFF * max(abs(y) for y in ys)
         for (x0, y0), (x1, y1) in pairwise(zip(xs, ys, strict=True)):
@@ -81,7 +81,7 @@ def kink_fault(name: str, variable: str, curve: Callable[[float], float], scale:
         slopes.append((-5.0 * one + 8.0 * two - 3.0 * three) / (2.0 * side))
     steepest = max(abs(slope) for slope in slopes)
     gap = max(abs(value - middle) for value in values)
-    at_zero = place(variable, 0.0) + suffix
+    at_zero = point_text(variable, 0.0) + suffix
     if gap > KINK * step * steepest + 1e-9 * abs(middle):
         steps = f"from {values[0]:.4g} over {middle:.4g} to {values[1]:.4g}"
         return f"{name} jumps {steps} at {at_zero}; a continuous law is needed"

@@ -9,7 +9,7 @@ from numbers import Real
 
 from limb_nodes.levels import CONTRACTS, Equation
 from limb_nodes.model.chosen import ChosenLaw
-from limb_nodes.model.curve_checks import number
+from limb_nodes.model.curve_checks import number_text
 from limb_nodes.model.system import all_equations
 
 
@@ -130,5 +130,5 @@ def states_fault(chosen: ChosenLaw, probe: Probe, points: Iterable[tuple[dict[st
             for state in law.states:
                 if not math.isfinite(values[state.rate]):
                     at = ", ".join(f"{name} {value:.4g}" for name, value in states.items())
-                    return f"{state.rate} is {number(values[state.rate])} at {at}{words}; a finite rate is needed"
+                    return f"{state.rate} is {number_text(values[state.rate])} at {at}{words}; a finite rate is needed"
     return ""

@@ -12,8 +12,7 @@ from limb_nodes.errors import UserError
 def params_folder() -> Path:
     """The folder of the shipped YAML files: of the checkout or prefix this package runs from, or of one in use.
 
-    Raises:
-        UserError: none of them has it.
+    Raises UserError if none of them has it.
     """
     here = Path(__file__).resolve()
     # A package in a prefix lies some levels below it, in lib/python3.x/site-packages.
@@ -26,7 +25,7 @@ def params_folder() -> Path:
 
 
 def shipped(name: str, folder: Path | None = None) -> Path:
-    """A shipped YAML file, such as ``reference_joint.yaml``, or the file of that name in another folder."""
+    """A shipped YAML file, such as ``reference_joint.yaml``, or that of another folder. Raises UserError."""
     path = (folder or params_folder()) / name
     if not path.is_file():
         raise UserError(f"{path}: no such file")

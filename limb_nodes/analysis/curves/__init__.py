@@ -22,8 +22,8 @@ def characteristics(limb: Limb) -> list[Characteristic]:
         motor_units.recruitment(limb),
         muscles.activation_dynamics(limb),
         muscles.tendon(limb),
-        muscles.path(limb),
-        muscles.moment_arm(limb),
+        muscles.paths(limb),
+        muscles.moment_arms(limb),
         muscles.pennation(limb),
     ]
     return [one for one in every if one.curves]

@@ -25,7 +25,7 @@ def moved(
     rates = [state.rate for state in chosen.law.states]
 
     def slope(_: float, states: FloatArray) -> list[float]:
-        values = probe.at(**point, **named(chosen, states))
+        values = probe.at(**point, **states_by_name(chosen, states))
         return [values[rate] for rate in rates]
 
     span = (times[0], times[-1])
@@ -33,7 +33,7 @@ def moved(
     return np.asarray(solved.y)
 
 
-def named(chosen: ChosenLaw, states: FloatArray) -> dict[str, float]:
+def states_by_name(chosen: ChosenLaw, states: FloatArray) -> dict[str, float]:
     """States by name."""
     return {state.name: float(value) for state, value in zip(chosen.law.states, states, strict=True)}
 
@@ -44,4 +44,4 @@ def steady_state(chosen: ChosenLaw, probe: Probe, point: Mapping[str, float]) ->
     if not start:
         return probe.at(**point)
     end = moved(chosen, probe, point, np.array([*start.values()]), np.array([0.0, SETTLING]), 1e-6)[:, -1]
-    return probe.at(**point, **named(chosen, end))
+    return probe.at(**point, **states_by_name(chosen, end))

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from limb_nodes.analysis.curves.characteristic import Axis, Characteristic, Curve
 from limb_nodes.analysis.curves.motor_units import POINTS, unit_lengths
-from limb_nodes.analysis.curves.movement import moved, named
+from limb_nodes.analysis.curves.movement import moved, states_by_name
 from limb_nodes.analysis.curves.uses import Use, law_names, legend, muscle_uses, shared, words
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import ChosenLaw, Limb, Muscle
@@ -45,7 +45,9 @@ def switched_activation(chosen: ChosenLaw, times: FloatArray) -> FloatArray:
     for excitation, span, first in ((1.0, rise, 0), (0.0, fall, 1)):
         point = {"excitation": excitation}
         course = moved(chosen, probe, point, states, span, 1e-8)
-        activations += [probe.at(**point, **named(chosen, values))["activation"] for values in course.T[first:]]
+        activations += [
+            probe.at(**point, **states_by_name(chosen, values))["activation"] for values in course.T[first:]
+        ]
         states = course[:, -1]
     return np.array(activations)
 
@@ -112,14 +114,14 @@ def path_values(muscle: Muscle, angles: FloatArray, variable: str) -> FloatArray
     return np.array([probe.at(joint_angle=float(angle), joint_velocity=0.0)[variable] for angle in angles])
 
 
-def path(limb: Limb) -> Characteristic:
+def paths(limb: Limb) -> Characteristic:
     """Muscle-tendon length by joint angle (2.43, 2.44)."""
     length = Axis("muscle-tendon length", "m")
     diagram = Characteristic("path", "Path", JOINT_ANGLE, length, owners="muscles", zero=False)
     return by_angle(limb, "muscle_tendon_length", diagram)
 
 
-def moment_arm(limb: Limb) -> Characteristic:
+def moment_arms(limb: Limb) -> Characteristic:
     """Moment arm by joint angle."""
     diagram = Characteristic("moment_arm", "Moment arm", JOINT_ANGLE, Axis("moment arm", "m"), owners="muscles")
     return by_angle(limb, "moment_arm", diagram)

@@ -44,20 +44,20 @@ def picture(run: BagSeries) -> Figure:
     heights = {name: height for name, height in heights.items() if height}
     places = figure.add_gridspec(len(heights), 1, height_ratios=list(heights.values()))
     parts = {name: places[row] for row, name in enumerate(heights)}
-    _headings(figure, run)
+    _draw_headings(figure, run)
     if run.limb is not None and postures:
-        _limbs(figure, parts["strip"], run.limb, postures)
+        _draw_limbs(figure, parts["strip"], run.limb, postures)
     if "legends" in parts:
         # Holds the room for the legends, which follow the panels below it.
         figure.add_subplot(parts["legends"], label="room").axis("off")
     marks = [shown.time for shown in postures]
     body = parts["body"].subgridspec(1, len(columns))
     for index, column in enumerate(columns):
-        _column(figure, body[index], index, column, run, marks)
+        _draw_column(figure, body[index], index, column, run, marks)
     return figure
 
 
-def _headings(figure: Figure, run: BagSeries) -> None:
+def _draw_headings(figure: Figure, run: BagSeries) -> None:
     name = run.limb.name if run.limb is not None else Path(run.source).name or run.path.resolve().name
     facts = [f"bag {run.path.resolve().name}", f"{run.start:g} to {run.end:g} s"]
     if run.rate is not None:
@@ -87,7 +87,7 @@ def _strip_height(postures: list[Posture], width: float) -> float:
     return min(max(height, LEAST_STRIP), MOST_STRIP) + 0.3
 
 
-def _limbs(figure: Figure, place: SubplotSpec, limb: Limb, postures: list[Posture]) -> None:
+def _draw_limbs(figure: Figure, place: SubplotSpec, limb: Limb, postures: list[Posture]) -> None:
     """The limb at some instants."""
     left, right, bottom, top = frame(postures)
     widths = [GRAVITY_WIDTH, *[1.0] * len(postures)]
@@ -107,7 +107,7 @@ def _legend_rows(column: Column) -> int:
     return bool(column.title) + -(-len(column.muscles) // LEGEND_COLUMNS)
 
 
-def _legend(axes: Axes, column: Column) -> Legend:
+def _column_legend(axes: Axes, column: Column) -> Legend:
     """The joint of a column and its muscles, above its first panel and that one's title."""
     from matplotlib.legend import Legend
     from matplotlib.lines import Line2D
@@ -130,7 +130,9 @@ def _legend(axes: Axes, column: Column) -> Legend:
     return legend
 
 
-def _column(figure: Figure, place: SubplotSpec, index: int, column: Column, run: BagSeries, marks: list[float]) -> None:
+def _draw_column(
+    figure: Figure, place: SubplotSpec, index: int, column: Column, run: BagSeries, marks: list[float]
+) -> None:
     grid = place.subgridspec(len(column.panels), 1)
     first: Axes | None = None
     filled = [row for row, panel in enumerate(column.panels) if panel is not None]
@@ -139,7 +141,7 @@ def _column(figure: Figure, place: SubplotSpec, index: int, column: Column, run:
             continue
         axes = figure.add_subplot(grid[row], sharex=first, label=f"{index}:{panel.kind}:{panel.title}")
         first = first or axes
-        _panel(axes, panel, run)
+        _draw_panel(axes, panel, run)
         if panel.kind == "angle":
             for mark in marks:
                 axes.axvline(mark, color=PALE, linewidth=0.9, linestyle=":", zorder=1)
@@ -149,14 +151,14 @@ def _column(figure: Figure, place: SubplotSpec, index: int, column: Column, run:
             axes.set_xlabel("time (s)")
     if first is not None and (column.muscles or column.title):
         # An artist beside the panel's own legend.
-        first.add_artist(_legend(first, column))
+        first.add_artist(_column_legend(first, column))
 
 
-def _panel(axes: Axes, panel: Panel, run: BagSeries) -> None:
+def _draw_panel(axes: Axes, panel: Panel, run: BagSeries) -> None:
     axes.set_title(panel.title).set_in_layout(False)
     axes.set_ylabel(panel.unit)
     if panel.raster is not None:
-        _raster(axes, panel.raster, run)
+        _draw_raster(axes, panel.raster, run)
         return
     for line in panel.lines:
         times, values = thinned(line.times, line.values)
@@ -165,7 +167,7 @@ def _panel(axes: Axes, panel: Panel, run: BagSeries) -> None:
         axes.set_ylim(*panel.limits)
     axes.margins(x=0)
     if panel.bounds is not None:
-        _bounds(axes, panel.bounds)
+        _draw_bounds(axes, panel.bounds)
     handles = [
         (handle, label)
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
@@ -179,7 +181,7 @@ def _panel(axes: Axes, panel: Panel, run: BagSeries) -> None:
         legend.set_in_layout(False)
 
 
-def _bounds(axes: Axes, bounds: tuple[float, float]) -> None:
+def _draw_bounds(axes: Axes, bounds: tuple[float, float]) -> None:
     """Dashed lines at the ends of a joint's range that the angles come near."""
     low, high = axes.get_ylim()
     near = 0.1 * (high - low)
@@ -189,7 +191,7 @@ def _bounds(axes: Axes, bounds: tuple[float, float]) -> None:
                      label="end of range" if index == 0 else "_")  # fmt: skip
 
 
-def _raster(axes: Axes, raster: Raster, run: BagSeries) -> None:
+def _draw_raster(axes: Axes, raster: Raster, run: BagSeries) -> None:
     """Frequencies as colours; white while a unit is silent."""
     import matplotlib
 

@@ -138,27 +138,21 @@ def read_series(
 ) -> BagSeries:
     """Read what a picture of a bag shows.
 
-    Args:
-        path: the bag.
-        namespace: of the limb, if the bag holds several.
-        start: first time, s; None for the bag's first.
-        end: last time, s; None for the bag's last.
-        reference: a bag with recorded angles (`reference_angle`); None takes those of the bag itself.
-
-    Raises:
-        UserError: there is no such bag, nothing in it that can be drawn, or nothing between start and end.
+    namespace: of the limb, if the bag holds several. start, end: first and last time, s; None for the bag's own.
+    reference: a bag with recorded angles (`reference_angle`); None takes those of the bag itself.
+    Raises UserError if there is no such bag, nothing in it that can be drawn, or nothing between start and end.
     """
     _check_times(start, end)
     with BagReader(path) as reader:
         bag = _Bag(reader, namespace, start, end)
         info = bag.info()
         limb, notes = _limb(info, str(path))
-        parts = {**_drive(bag), **_units(bag), **_muscles(bag), **_joints(bag)}
+        parts = {**_read_drive(bag), **_read_units(bag), **_read_muscles(bag), **_read_joints(bag)}
         if reference is None and bag.has(ANGLE_TOPIC):
             table = bag.table(ANGLE_TOPIC)
             parts["reference"] = bag.cut(ANGLE_TOPIC, table, _names(table["name"]), "position")
     if reference is not None:
-        parts["reference"] = _recorded(reference, start, end)
+        parts["reference"] = _read_recorded(reference, start, end)
     if "reference" in parts and "angle" in parts:
         parts["reference"] = _matched(parts["reference"], parts["angle"].names, reference, notes)
     first, last = _shown(path, bag, start, end)
@@ -238,7 +232,7 @@ def _names(texts: npt.NDArray[Any]) -> tuple[str, ...]:
     return tuple(str(text) for text in texts)
 
 
-def _drive(bag: _Bag) -> dict[str, Any]:
+def _read_drive(bag: _Bag) -> dict[str, Any]:
     topic = next((topic for topic in ("activation", ENVELOPE_TOPIC) if bag.has(topic)), None)
     if topic is None:
         return {}
@@ -247,7 +241,7 @@ def _drive(bag: _Bag) -> dict[str, Any]:
     return {"drive": drive, "is_envelope": topic == ENVELOPE_TOPIC}
 
 
-def _units(bag: _Bag) -> dict[str, Any]:
+def _read_units(bag: _Bag) -> dict[str, Any]:
     topic = "motor_unit_state"
     if not bag.has(topic):
         return {}
@@ -256,7 +250,7 @@ def _units(bag: _Bag) -> dict[str, Any]:
     return {"frequency": frequency, "owners": _names(table["muscle"])}
 
 
-def _muscles(bag: _Bag) -> dict[str, Any]:
+def _read_muscles(bag: _Bag) -> dict[str, Any]:
     topic = "muscle_state"
     if not bag.has(topic):
         return {}
@@ -265,7 +259,7 @@ def _muscles(bag: _Bag) -> dict[str, Any]:
     return {"muscles": {field: bag.cut(topic, table, names, field) for field in MUSCLE_FIELDS}}
 
 
-def _joints(bag: _Bag) -> dict[str, Any]:
+def _read_joints(bag: _Bag) -> dict[str, Any]:
     series = {}
     if bag.has("joint_torque"):
         table = bag.table("joint_torque")
@@ -280,7 +274,7 @@ def _joints(bag: _Bag) -> dict[str, Any]:
     return series
 
 
-def _recorded(path: str | Path, start: float | None, end: float | None) -> Series:
+def _read_recorded(path: str | Path, start: float | None, end: float | None) -> Series:
     """The recorded angles of a bag, whose time counts from its first sample on, as that of a run does."""
     with BagReader(path) as reader:
         if not reader.has(ANGLE_TOPIC):

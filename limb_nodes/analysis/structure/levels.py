@@ -67,12 +67,12 @@ def sets_of_muscles(limb: Limb, assembly: Assembly) -> Iterator[EquationSet]:
     """Muscles, tendons and aponeuroses, one set for each choice of laws; then muscles with all that is in them."""
     for group in grouped(limb, lambda muscle: (laws_of(muscle, MUSCLE_LAWS), unit_laws(muscle, COMMON_LAWS))):
         first = group[0]
-        laws = named(laws_of(first, MUSCLE_LAWS)) | named(unit_laws(first, COMMON_LAWS)[0])
+        laws = names_by_process(laws_of(first, MUSCLE_LAWS)) | names_by_process(unit_laws(first, COMMON_LAWS)[0])
         yield owned_view(assembly, MUSCLE, [MUSCLE], owners_of(first), laws, [m.name for m in group])
     for level in (TENDON, APONEUROSIS):
         for group in grouped(limb, lambda muscle, level=level: laws_of(muscle, [level])):  # type: ignore[misc]
             first = group[0]
-            laws = named(laws_of(first, [level]))
+            laws = names_by_process(laws_of(first, [level]))
             view = owned_view(assembly, level, [level], owners_of(first), laws, [m.name for m in group])
             if view.relations:
                 yield view
@@ -99,14 +99,14 @@ def unit_laws(muscle: Muscle, processes: Sequence[str]) -> tuple[tuple[Law, ...]
     return tuple(tuple(unit.laws[process].law for process in processes) for unit in muscle.units)
 
 
-def named(laws: Iterable[Law]) -> dict[str, str]:
+def names_by_process(laws: Iterable[Law]) -> dict[str, str]:
     """Names of laws by process."""
     return {law.process: law.name for law in laws}
 
 
 def all_laws(muscle: Muscle) -> dict[str, str]:
     """Names of all laws of a muscle and its motor units by process."""
-    names = named(laws_of(muscle, muscle.laws))
+    names = names_by_process(laws_of(muscle, muscle.laws))
     for process in UNIT_PROCESSES:
         laws = [unit.laws[process].law.name for unit in muscle.units]
         names[process] = ", ".join(dict.fromkeys(laws))

@@ -36,7 +36,7 @@ def structure_matrix(system: EquationSet) -> Matrix:
     """The structure matrix of a set of equations."""
     entries: dict[tuple[str, str], str] = {}
     columns: dict[str, None] = {}
-    relations = sorted(system.relations, key=lambda relation: place(relation.label))
+    relations = sorted(system.relations, key=lambda relation: report_order(relation.label))
     for relation in relations:
         columns.setdefault(symbol(relation.defines.variable.name))
     for relation in relations:
@@ -58,7 +58,7 @@ def structure_matrix(system: EquationSet) -> Matrix:
     return Matrix(rows, ordered, frozenset(c for c in ordered if c not in own), entries)
 
 
-def place(label: str) -> tuple[int, int]:
+def report_order(label: str) -> tuple[int, int]:
     """Chapter and number of an equation in the report; those without a number come last."""
     number = re.match(r"(\d+)\.(\d+)", label)
     return (int(number[1]), int(number[2])) if number else (1000, 0)

@@ -40,14 +40,14 @@ def report(findings: Sequence[Findings], limb_name: str, width: int, every_matri
 
     every_matrix: print those of the assembled muscle and the whole model too, which hold those of the other levels.
     """
-    parts = [f"structure of {limb_name}", "", *summary(findings, width)]
+    parts = [f"structure of {limb_name}", "", *summary_lines(findings, width)]
     parts += ["", *wrapped(LEGEND, width, "")]
     for one in findings:
         parts += ["", *level_lines(one, width, every_matrix)]
     return "\n".join(parts)
 
 
-def summary(findings: Iterable[Findings], width: int) -> list[str]:
+def summary_lines(findings: Iterable[Findings], width: int) -> list[str]:
     """One line for each level; laws for which a line has no room stand below."""
     rows = [("level", "equations", "unknowns", "dof", "index", "block", "kind", "laws")]
     for one in findings:
