@@ -15,9 +15,9 @@ from typing import TypeVar
 import numpy as np
 
 from limb_nodes.foundation.arrays import FloatArray
-from limb_nodes.foundation.records import Record, copy_record, new_record, whole_numbers
+from limb_nodes.foundation.records import Record, whole_numbers
 from limb_nodes.levels import MUSCLE_PROCESSES, UNIT_PROCESSES
-from limb_nodes.model.chain import chain_block
+from limb_nodes.model.chain import segments_of, world_of
 from limb_nodes.model.kinds import MuscleKind, UnitKind
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
 from limb_nodes.model.system import BoundEquation, System
@@ -42,7 +42,7 @@ class Layout:
     """A limb as the flat arrays that compiled code reads.
 
     model: what does not change during a solve, one record with these fields:
-        chain: float64, the block that `chain_of` takes apart.
+        world, segments: float64 [3], [4 + n, n], the chain, rows as in `limb_nodes.model.chain`.
         parameters: float64, a row per muscle, group and unit, SI units; which numbers, its kind tells (`columns`).
         muscles, groups, units: one record for each, `MUSCLE_RECORD`, `GROUP_RECORD`, `UNIT_RECORD`.
     initial_states: float64 [internal states], initial values of tendons, aponeuroses and laws.
@@ -88,8 +88,8 @@ class Layout:
 
     def of_limb(self, limb: Limb) -> Layout:
         """The layout of a limb that differs in its chain alone."""
-        model = copy_record(self.model)
-        model.chain[:] = chain_block(limb)
+        model = self.model.copy()
+        model.world[:], model.segments[:] = world_of(limb), segments_of(limb)
         return replace(self, limb=limb, model=model)
 
 
@@ -224,11 +224,12 @@ class Packer:
 
     def layout(self) -> Layout:
         """The arrays."""
-        chain = chain_block(self.limb)
-        model = new_record(
+        world, segments = world_of(self.limb), segments_of(self.limb)
+        model = Record(
             np.dtype(
                 [
-                    ("chain", np.float64, chain.shape),
+                    ("world", np.float64, world.shape),
+                    ("segments", np.float64, segments.shape),
                     ("parameters", np.float64, (len(self.parameters),)),
                     ("muscles", MUSCLE_RECORD, (len(self.muscles),)),
                     ("groups", GROUP_RECORD, (len(self.groups),)),
@@ -236,7 +237,7 @@ class Packer:
                 ]
             )
         )
-        model.chain[:] = chain
+        model.world[:], model.segments[:] = world, segments
         model.parameters[:] = self.parameters
         model.muscles[:] = self.muscles
         model.groups[:] = self.groups
@@ -290,9 +291,10 @@ def build_layout(limb: Limb, known: Layout | None = None) -> Layout:
 
 def same_structure(one: Layout, other: Layout) -> bool:
     """Whether two limbs have one program and every number at the same place."""
+    records = ("muscles", "groups", "units")
     return (
         one.muscle_kinds == other.muscle_kinds
         and one.unit_kinds == other.unit_kinds
-        and one.model.dtype == other.model.dtype
-        and all(np.array_equal(one.model[name], other.model[name]) for name in ("muscles", "groups", "units"))
+        and one.model.kind == other.model.kind
+        and all(np.array_equal(getattr(one.model, name), getattr(other.model, name)) for name in records)
     )

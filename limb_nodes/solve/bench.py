@@ -255,12 +255,12 @@ class MuscleBench:
         drive = self.model.drives(np.array([[excitation]]))
         held_drive = straight(drive[0], drive[0])
         scale = layout.state_scales
-        data = self.model.new_data(0.0, 1.0)
+        data = self.model.new_data(1.0)
         data.angles_before[:] = data.angles_after[:] = length
 
         def rates(x: FloatArray) -> FloatArray:
             out = np.zeros_like(x)
-            program.muscle_rates(0.0, x, held_drive, layout.model, data, out)
+            program.muscle_rates(0.0, x, held_drive, layout.model.address, data.address, out)
             return out / scale
 
         held = np.array([length]), np.zeros(1)
@@ -333,11 +333,12 @@ class MuscleBench:
         layout = self.model.layout
         muscle = np.zeros((len(time), 1, len(MUSCLE_OUTPUTS)))
         unit = np.zeros((len(time), layout.units, len(UNIT_OUTPUTS)))
+        data = self.model.new_data(1.0)
         self.model.program.observe_all(
             np.ascontiguousarray(np.column_stack([length, rate, internal])),
             np.ascontiguousarray(excitation[:, np.newaxis]),
-            layout.model,
-            self.model.new_data(0.0, 1.0),
+            layout.model.address,
+            data.address,
             muscle,
             unit,
         )

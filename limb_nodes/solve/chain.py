@@ -4,213 +4,171 @@ The equations of `levels.limb.chain` hold for segment angles. Here they are summ
 outwards, which turns them into equations for joint angles in which the torque of a joint appears
 once, and in which a joint that rests on its limit is simply left out.
 
-Arguments of all functions, for n joints: block, the constants that `model.chain.chain_of` takes apart;
-load [3], force on the tip in x and y (N) and torque on it (N m); angle, velocity, torque, locked [n] as in
-`solve.data`; scratch, `scratch_size` numbers, of which each function says what it needs there and leaves there.
+Arguments of all functions, for n joints: world, segments: the constants of `limb_nodes.model.chain`. load: [3],
+force on the tip in x and y (N) and torque on it (N m). y: [2 n or more], joint angles, then velocities. torque,
+locked: [n] as in `limb_nodes.solve.data`. scratch: [4 + n, n], rows as named below.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
 
 from numba import njit
 
 from limb_nodes.levels.limb import chain
-from limb_nodes.model.chain import chain_of
-from limb_nodes.solve.inner import inner
+from limb_nodes.model.chain import BASE_ANGLE, COUPLING, GRAVITY_X, GRAVITY_Y, LENGTH, MOMENT
 
-OPTIONS = {"error_model": "numpy", "cache": True}
+# Inlined: to hand over eight arrays takes as long as the equations of one joint.
+OPTIONS = {"error_model": "numpy", "cache": True, "forceinline": True}
+
+FORCE_X, FORCE_Y, TIP_TORQUE = 0, 1, 2
+# Rows of the numbers between the stages of an evaluation: torque of motion, gravity and load about each joint (N m);
+# cosine and sine of each segment's absolute angle, and its speed (rad/s); then n rows of the inertia matrix of the
+# joints (kg m^2), which its Cholesky factor replaces.
+BIAS, COSINE, SINE, SPEED, INERTIA = 0, 1, 2, 3, 4
 
 inertia_coupling = njit(**OPTIONS)(chain.inertia_coupling)
 centrifugal_torque = njit(**OPTIONS)(chain.centrifugal_torque)
 tip_force_torque = njit(**OPTIONS)(chain.tip_force_torque)
 gravity_torque = njit(**OPTIONS)(chain.gravity_torque)
-constants = inner(chain_of)
-
-
-class Scratch(NamedTuple):
-    """Views of the numbers between the stages of an evaluation, of n joints.
-
-    inertia: [n, n], kg m^2, inertia matrix of the joints, then its Cholesky factor. bias: [n], N m, torque of
-    motion, gravity and load about each joint. cosine, sine: [n], of the segments' absolute angles.
-    speed: [n], rad/s, of the segments.
-    """
-
-    inertia: Any
-    bias: Any
-    cosine: Any
-    sine: Any
-    speed: Any
-
-
-def scratch_size(n: int) -> int:
-    """How many numbers `Scratch` takes."""
-    return n * n + 4 * n
-
-
-@inner
-def parts(scratch, n):
-    """`Scratch` of a flat array."""
-    at = n * n
-    return Scratch(
-        scratch[:at].reshape((n, n)),
-        scratch[at : at + n],
-        scratch[at + n : at + 2 * n],
-        scratch[at + 2 * n : at + 3 * n],
-        scratch[at + 3 * n : at + 4 * n],
-    )
 
 
 @njit(**OPTIONS)
-def joint_equations(block, load, angle, velocity, scratch):
-    """Fill scratch with the inertia matrix of the joints, the bias and what both are made of."""
-    n = angle.size
-    segments = constants(block, n)
-    own = parts(scratch, n)
-    absolute, turn = segments.base_angle, 0.0
+def joint_equations(world, segments, load, y, scratch):
+    """Fill scratch with the inertia matrix of the joints, the bias and what both consist of."""
+    n = scratch.shape[1]
+    angle, turn = world[BASE_ANGLE], 0.0
     for k in range(n):
-        absolute += angle[k]
-        turn += velocity[k]
-        own.cosine[k] = math.cos(absolute)
-        own.sine[k] = math.sin(absolute)
-        own.speed[k] = turn
+        angle += y[k]
+        turn += y[n + k]
+        scratch[COSINE, k] = math.cos(angle)
+        scratch[SINE, k] = math.sin(angle)
+        scratch[SPEED, k] = turn
     for k in range(n):
-        ck, sk = own.cosine[k], own.sine[k]
-        torque = gravity_torque(segments.moments[k], ck, sk, segments.gravity_x, segments.gravity_y)
-        torque += tip_force_torque(segments.lengths[k], ck, sk, load[0], load[1])
+        ck, sk = scratch[COSINE, k], scratch[SINE, k]
+        torque = gravity_torque(segments[MOMENT, k], ck, sk, world[GRAVITY_X], world[GRAVITY_Y])
+        torque += tip_force_torque(segments[LENGTH, k], ck, sk, load[FORCE_X], load[FORCE_Y])
         for other in range(n):
-            coupling = segments.couplings[k, other]
-            cp, sp = own.cosine[other], own.sine[other]
+            coupling = segments[COUPLING + k, other]
+            cp, sp = scratch[COSINE, other], scratch[SINE, other]
             # The diagonal's angle is zero, so 3.8 and 3.3-3.5 are one expression.
-            own.inertia[k, other] = inertia_coupling(coupling, ck * cp + sk * sp)
-            torque += centrifugal_torque(coupling, sk * cp - ck * sp, own.speed[other])
-        own.bias[k] = torque
-    own.bias[n - 1] += load[2]
+            scratch[INERTIA + k, other] = inertia_coupling(coupling, ck * cp + sk * sp)
+            torque += centrifugal_torque(coupling, sk * cp - ck * sp, scratch[SPEED, other])
+        scratch[BIAS, k] = torque
+    scratch[BIAS, n - 1] += load[TIP_TORQUE]
     for k in range(n - 2, -1, -1):
-        own.bias[k] += own.bias[k + 1]
+        scratch[BIAS, k] += scratch[BIAS, k + 1]
         for other in range(n):
-            own.inertia[k, other] += own.inertia[k + 1, other]
+            scratch[INERTIA + k, other] += scratch[INERTIA + k + 1, other]
     for k in range(n):
         for other in range(n - 2, -1, -1):
-            own.inertia[k, other] += own.inertia[k, other + 1]
+            scratch[INERTIA + k, other] += scratch[INERTIA + k, other + 1]
 
 
 @njit(**OPTIONS)
-def factor_free(locked, inertia):
-    """Cholesky factor of an inertia matrix [n, n] in place, locked joints left out."""
-    n = locked.size
+def factor_free(locked, scratch):
+    """Cholesky factor of the inertia matrix in place, locked joints left out."""
+    n = scratch.shape[1]
     for k in range(n):
         if locked[k] != 0.0:
             for other in range(n):
-                inertia[k, other] = 0.0
-                inertia[other, k] = 0.0
-            inertia[k, k] = 1.0
+                scratch[INERTIA + k, other] = 0.0
+                scratch[INERTIA + other, k] = 0.0
+            scratch[INERTIA + k, k] = 1.0
     for k in range(n):
         for other in range(k + 1):
-            total = inertia[k, other]
+            total = scratch[INERTIA + k, other]
             for i in range(other):
-                total -= inertia[k, i] * inertia[other, i]
+                total -= scratch[INERTIA + k, i] * scratch[INERTIA + other, i]
             if other == k:
-                inertia[k, k] = math.sqrt(total)
+                scratch[INERTIA + k, k] = math.sqrt(total)
             else:
-                inertia[k, other] = total / inertia[other, other]
+                scratch[INERTIA + k, other] = total / scratch[INERTIA + other, other]
 
 
 @njit(**OPTIONS)
-def solve_free(locked, factor, right):
-    """Solve for right [n] in place with a Cholesky factor [n, n]; 0 for locked joints."""
-    n = locked.size
+def solve_free(locked, right, scratch):
+    """Solve for right [n] in place with the factor of the inertia matrix; 0 for locked joints."""
+    n = scratch.shape[1]
     for k in range(n):
         total = right[k] if locked[k] == 0.0 else 0.0
         for i in range(k):
-            total -= factor[k, i] * right[i]
-        right[k] = total / factor[k, k]
+            total -= scratch[INERTIA + k, i] * right[i]
+        right[k] = total / scratch[INERTIA + k, k]
     for k in range(n - 1, -1, -1):
         total = right[k]
         for i in range(k + 1, n):
-            total -= factor[i, k] * right[i]
-        right[k] = total / factor[k, k]
+            total -= scratch[INERTIA + i, k] * right[i]
+        right[k] = total / scratch[INERTIA + k, k]
 
 
 @njit(**OPTIONS)
-def acceleration(block, load, angle, velocity, torque, locked, out, scratch):
+def acceleration(world, segments, load, y, torque, locked, out, scratch):
     """Joint accelerations out [n] (rad/s^2) by 3.11, zero for locked joints; leaves the inertia's factor."""
-    joint_equations(block, load, angle, velocity, scratch)
-    own = parts(scratch, angle.size)
-    for k in range(angle.size):
-        out[k] = own.bias[k] + torque[k]
-    factor_free(locked, own.inertia)
-    solve_free(locked, own.inertia, out)
+    joint_equations(world, segments, load, y, scratch)
+    for k in range(scratch.shape[1]):
+        out[k] = scratch[BIAS, k] + torque[k]
+    factor_free(locked, scratch)
+    solve_free(locked, out, scratch)
 
 
 @njit(**OPTIONS)
-def reaction(block, load, angle, velocity, torque, acceleration, out, scratch):
+def reaction(world, segments, load, y, torque, acceleration, out, scratch):
     """Torque out [n] (N m) that the limit puts on each joint at given accelerations [n]."""
-    n = angle.size
-    joint_equations(block, load, angle, velocity, scratch)
-    own = parts(scratch, n)
+    n = scratch.shape[1]
+    joint_equations(world, segments, load, y, scratch)
     for k in range(n):
-        total = -own.bias[k] - torque[k]
+        total = -scratch[BIAS, k] - torque[k]
         for other in range(n):
-            total += own.inertia[k, other] * acceleration[other]
+            total += scratch[INERTIA + k, other] * acceleration[other]
         out[k] = total
 
 
 @njit(**OPTIONS)
-def impact(block, load, angle, velocity, locked, scratch):
-    """Stop the locked joints dead: velocity [n] becomes that after the impulse.
+def impact(world, segments, load, y, locked, scratch):
+    """Stop the locked joints dead: the velocities in y become those after the impulse.
 
     The momenta of the free joints are kept: M_ff v_f' = M_ff v_f + M_fl v_l.
     """
-    n = angle.size
-    joint_equations(block, load, angle, velocity, scratch)
-    own = parts(scratch, n)
-    momentum = own.bias
+    n = scratch.shape[1]
+    joint_equations(world, segments, load, y, scratch)
+    momentum = scratch[BIAS]
     for k in range(n):
         total = 0.0
         for other in range(n):
-            total += own.inertia[k, other] * velocity[other]
+            total += scratch[INERTIA + k, other] * y[n + other]
         momentum[k] = total
-    factor_free(locked, own.inertia)
-    solve_free(locked, own.inertia, momentum)
+    factor_free(locked, scratch)
+    solve_free(locked, momentum, scratch)
     for k in range(n):
-        velocity[k] = momentum[k]
+        y[n + k] = momentum[k]
 
 
 @njit(**OPTIONS)
-def solve_with_factor(locked, right, scratch):
-    """Solve for right [n] in place with the factor that `acceleration` has left in scratch."""
-    solve_free(locked, parts(scratch, locked.size).inertia, right)
-
-
-@njit(**OPTIONS)
-def bias_slopes(block, load, acceleration, scratch, by_angle, by_velocity):
+def bias_slopes(world, segments, load, acceleration, by_angle, by_velocity, scratch):
     """Slopes of (torque of motion, gravity and load) - (inertia matrix) (acceleration).
 
     by_angle, by_velocity: [n, n], change of the torque about joint k (column) with the angle or
     velocity of a joint (row), accelerations held. Needs what `joint_equations` leaves in scratch.
     """
-    n = acceleration.size
-    segments = constants(block, n)
-    own = parts(scratch, n)
+    n = scratch.shape[1]
     for k in range(n):
-        ck, sk = own.cosine[k], own.sine[k]
-        pull_on_self = segments.moments[k] * (-sk * segments.gravity_y - ck * segments.gravity_x)
-        pull_on_self += segments.lengths[k] * (-sk * load[1] - ck * load[0])
+        ck, sk = scratch[COSINE, k], scratch[SINE, k]
+        own = segments[MOMENT, k] * (-sk * world[GRAVITY_Y] - ck * world[GRAVITY_X])
+        own += segments[LENGTH, k] * (-sk * load[FORCE_Y] - ck * load[FORCE_X])
         spin = 0.0
         for other in range(n):
-            cp, sp = own.cosine[other], own.sine[other]
+            cp, sp = scratch[COSINE, other], scratch[SINE, other]
             spin += acceleration[other]
-            turn = own.speed[other]
-            coupling = segments.couplings[k, other]
+            turn = scratch[SPEED, other]
+            coupling = segments[COUPLING + k, other]
             between_sine, between_cosine = sk * cp - ck * sp, ck * cp + sk * sp
             by_velocity[other, k] = -2.0 * coupling * between_sine * turn
             if other != k:
                 pull = coupling * (between_cosine * turn * turn - between_sine * spin)
                 by_angle[other, k] = pull
-                pull_on_self -= pull
-        by_angle[k, k] = pull_on_self
+                own -= pull
+        by_angle[k, k] = own
     for matrix in (by_angle, by_velocity):
         for k in range(n - 2, -1, -1):
             for other in range(n):

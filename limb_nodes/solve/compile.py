@@ -21,10 +21,11 @@ from limb_nodes.solve import chain, held
 from limb_nodes.solve.generate import program
 
 IMPORTS = (
-    "from limb_nodes.solve.chain import acceleration, bias_slopes, constants, impact, reaction, solve_with_factor\n"
+    "from limb_nodes.model.chain import HIGHEST, LOWEST\n"
+    "from limb_nodes.solve.chain import acceleration, bias_slopes, impact, reaction, solve_free\n"
     "from limb_nodes.solve.held import held_torque\n"
-    "from limb_nodes.solve.pointer import callback\n"
-    "from limb_nodes.solve.problem import arguments_of\n"
+    "from limb_nodes.solve.pointer import callback, record_at\n"
+    "from limb_nodes.solve.problem import FUNCTION\n"
 )
 # Modules whose functions become a part of every program.
 COMPILED_IN = (model_chain, chain, held)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from limb_nodes.model.layout import Layout
-from limb_nodes.solve.chain import scratch_size
+from limb_nodes.solve.chain import INERTIA
 
 # The linear model of the torque that holds for one tick, rows of `data.held` (see `limb_nodes.solve.held`).
 HELD_ROWS = 7
@@ -16,14 +16,14 @@ HELD_ROWS = 7
 def data_type(layout: Layout) -> np.dtype[Any]:
     """The type of a limb's data, of n joints; everything is float64.
 
-    start, period: time of the first sample of the input and time between two samples (s).
+    period: time between two samples of the input (s), the first of which is at 0 s.
     load: [3], force on the tip in x and y (N) and torque on it (N m).
     locked: [n], 1 or -1 while a joint rests on its highest or lowest angle, else 0.
     torque: [n], of the muscles about each joint (N m). acceleration: [n], of the joints (rad/s^2).
     held: [7, n], the torque of a tick, its slopes, its state and its curvature (`limb_nodes.solve.held`).
     angles_before, velocities_before, angles_after, velocities_after: [n], joint states at a tick's ends
         (rad, rad/s), between which the muscles follow a cubic.
-    chain: what the chain's equations keep from one stage to the next (`limb_nodes.solve.chain`).
+    chain: [4 + n, n], what the chain's equations keep from one stage to the next (`limb_nodes.solve.chain`).
     drives, drives_t: [drives], what the input does to muscles and units, and its tangent.
     scratch: what muscles and groups keep from one stage to the next.
     internal_t: [internal states], their tangent. rates, rates_t: [internal states], changes with time
@@ -41,7 +41,7 @@ def data_type(layout: Layout) -> np.dtype[Any]:
         "velocities_before": joints,
         "angles_after": joints,
         "velocities_after": joints,
-        "chain": scratch_size(joints),
+        "chain": (INERTIA + joints, joints),
         "drives": drives,
         "drives_t": drives,
         "scratch": layout.scratch,
@@ -50,4 +50,4 @@ def data_type(layout: Layout) -> np.dtype[Any]:
         "rates_t": states,
     }
     arrays = [(name, np.float64, size if isinstance(size, tuple) else (size,)) for name, size in sizes.items()]
-    return np.dtype([("start", np.float64), ("period", np.float64), *arrays])
+    return np.dtype([("period", np.float64), *arrays])

@@ -14,18 +14,20 @@ from numba import njit
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.records import Record
 from limb_nodes.model.layout import Layout
-from limb_nodes.solve.pointer import Callback
-from limb_nodes.solve.problem import evaluate, new_problem
+from limb_nodes.solve.pointer import Callback, record_at
+from limb_nodes.solve.problem import evaluate, new_problem, problem_type
 from limb_nodes.solve.table import BUCKETS, NODES, TOLERANCE, Table, tabulate
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def look_up(edges, table, starts, problem, muscle, span, excitation, out):
+def look_up(edges, table, starts, problem_, muscle, span, excitation, out):
     """Fill the columns of a span (first, end) of out [T, drives] for a muscle's excitation [T].
 
-    edges, table, starts: of its `Table`. problem: its rates are the drives by the laws.
+    edges, table, starts: of its `Table`. problem_: address of a problem whose
+    rates are the drives by the laws.
     """
     first, last = span
+    problem = record_at(problem_, problem_type)
     owner = np.full(1, float(muscle))
     scratch = np.empty(out.shape[1])
     before = np.nan
@@ -92,5 +94,5 @@ class DriveTable:
         out = np.empty((len(excitation), self._layout.drives))
         for muscle, (table, span) in enumerate(zip(self.tables, self._spans, strict=True)):
             own = np.ascontiguousarray(excitation[:, muscle])
-            look_up(table.edges, table.coefficients, table.starts, self._of_muscle, muscle, span, own, out)
+            look_up(table.edges, table.coefficients, table.starts, self._of_muscle.address, muscle, span, own, out)
         return out

@@ -571,7 +571,7 @@ def program(layout: Layout, imports: str, entries: str) -> str:
         **dict(sorted(equations.constants.items())),
     }
     lines = [f"{name} = {value!r}" for name, value in constants.items()]
-    lines += [f"MODEL = {record_text(layout.model.dtype)}", f"DATA = {record_text(data_type(layout))}"]
-    lines.append("ARGUMENTS = arguments_of(from_dtype(MODEL), from_dtype(DATA))")
+    lines.append(f"MODEL = from_dtype({record_text(layout.model.kind)})")
+    lines.append(f"DATA = from_dtype({record_text(data_type(layout))})")
     head = "\n".join([PRELUDE, imports, DECORATORS, *lines])
     return head + "\n\n\n" + "\n\n".join([*equations.texts, *texts, entries])

@@ -13,14 +13,18 @@ from numba import njit, types
 
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.limits import NOTHING
-from limb_nodes.solve.pointer import f8, invoke
+from limb_nodes.solve.pointer import f8, i8, invoke, record_at
 from limb_nodes.solve.problem import (
+    NEW_STATE,
+    SCALE,
+    STAGES,
+    START_RATES,
+    STATE,
     control_type,
     evaluate,
     method_type,
     problem_type,
     take_step,
-    work_of,
     work_rows,
 )
 
@@ -38,9 +42,13 @@ def copy(source, target):
         target[i] = source[i]
 
 
-@njit(types.void(problem_type, vector, vector, table), cache=True, error_model="numpy")
-def difference_slopes(problem, y, scale, out):
-    """Slopes of the rates at time 0, out [states, states], by central differences. scale: typical sizes [states]."""
+@njit(types.void(i8, vector, vector, table), cache=True, error_model="numpy")
+def difference_slopes(problem_, y, scale, out):
+    """Slopes of the rates at time 0, out [states, states], by central differences.
+
+    problem_: address of the problem. scale: typical sizes [states].
+    """
+    problem = record_at(problem_, problem_type)
     n = y.size
     moved, low, high = y.copy(), np.empty(n), np.empty(n)
     for j in range(n):
@@ -71,41 +79,44 @@ def growth(error, last_error, method):
 
 
 @inner
-def fill(t, h, row, times, out, method, rows, problem):
+def fill(t, h, row, times, out, method, work, problem):
     """Fill out [times, states] from `row` on with the states at times within a step; the row behind them."""
     first = row
     while row < times.size and times[row] <= t + h * (1.0 + 1e-12):
         row += 1
     if row > first:
-        invoke(method.between, t, h, row - first, times[first:], out[first:], method, rows, problem)
+        invoke(method.between, t, h, row - first, times[first:], out[first:], method, work, problem)
     return row
 
 
 @njit(
-    types.int64(method_type, problem_type, control_type, vector, vector, vector, vector, table),
+    types.int64(i8, i8, i8, vector, vector, vector, vector, table),
     cache=True,
     error_model="numpy",
     nogil=True,
 )
-def integrate(method, problem, control, stops, scale, y, times, out):
+def integrate(method_, problem_, control_, stops, scale, y, times, out):
     """Advance y [states] in place from `control.start` to `control.end`; a status.
 
+    method_, problem_, control_: addresses of the records.
     stops: times (rising) that no step may cross: kinks of the input. scale: typical sizes of the states.
     times, out: rising times within, and the states there [times, states].
     """
+    method, problem = record_at(method_, method_type), record_at(problem_, problem_type)
+    control = record_at(control_, control_type)
     end, span = control.end, control.end - control.start
-    rows = np.empty((work_rows(problem, method), problem.states))
-    work = work_of(rows, problem, method)
-    copy(y, work.state)
-    copy(scale, work.scale)
+    work = np.empty((work_rows(problem, method), problem.states))
+    state, start_rates = work[STATE], work[START_RATES]
+    copy(y, state)
+    copy(scale, work[SCALE])
     t = control.start
     row, stop = 0, 0
     while row < times.size and times[row] <= t:
         copy(y, out[row])
         row += 1
     if problem.joints > 0:
-        invoke(method.settle, t, method, rows, problem)
-    evaluate(problem.rates, t, work.state, problem, work.start_rates)
+        invoke(method.settle, t, method, work, problem)
+    evaluate(problem.rates, t, state, problem, start_rates)
     fresh = False
     h = control.next_step if control.next_step > 0.0 else min(control.longest, span) * 0.01
     h = min(h, control.longest)
@@ -128,9 +139,9 @@ def integrate(method, problem, control, stops, scale, y, times, out):
             status = STEP_TOO_SMALL
             break
         if method.implicit and not fresh:
-            evaluate(problem.jacobian, t, work.state, problem, work.slopes)
+            evaluate(problem.jacobian, t, state, problem, work[STAGES + method.stages])
             fresh = True
-        take_step(t, h, method, rows, control, problem)
+        take_step(t, h, method, work, control, problem)
         error = control.error
         if not error <= 1.0:
             if not math.isfinite(error) and h < 1e-12:
@@ -141,17 +152,17 @@ def integrate(method, problem, control, stops, scale, y, times, out):
             continue
         control.event = NOTHING
         if problem.joints > 0:
-            invoke(method.find_event, t, h, method, rows, control, problem)
+            invoke(method.find_event, t, h, method, work, control, problem)
             clipped = clipped and control.next_step == h
             h = control.next_step
         event = control.event != NOTHING
-        row = fill(t, h, row, times, out, method, rows, problem)
+        row = fill(t, h, row, times, out, method, work, problem)
         t = barrier if clipped and not event else t + h
-        copy(work.new_state, work.state)
+        copy(work[NEW_STATE], state)
         control.steps += 1
         fresh = False
         if event:
-            invoke(method.take_effect, t, method, rows, control, problem)
+            invoke(method.take_effect, t, method, work, control, problem)
             h = max(h, 0.1 * wanted)
         else:
             h *= growth(error, last_error, method)
@@ -160,10 +171,10 @@ def integrate(method, problem, control, stops, scale, y, times, out):
                 h = max(h, wanted)
         h = min(h, control.longest)
         if event or method.implicit:
-            evaluate(problem.rates, t, work.state, problem, work.start_rates)
+            evaluate(problem.rates, t, state, problem, start_rates)
         else:
-            copy(work.stages[method.stages - 1], work.start_rates)
-    copy(work.state, y)
+            copy(work[STAGES + method.stages - 1], start_rates)
+    copy(state, y)
     control.time = t
     control.next_step = h
     if status == DONE:

@@ -14,13 +14,16 @@ from numba import carray
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.pointer import callback, f8, numbers, numbers_at
 from limb_nodes.solve.problem import (
+    NEW_STATE,
+    STAGE_STATE,
+    START_RATES,
+    STATE,
     control_pointer,
     evaluate,
     method_pointer,
     problem_pointer,
     take_step,
     work_at,
-    work_of,
 )
 
 # What happens at the end of a step.
@@ -95,9 +98,9 @@ def pull_behind(t, method, work, problem, locked):
     """`pulled_back` at the end t of a step."""
     if method.implicit:
         # The explicit step ends with the rates there, which leave the torques that `reactions` takes.
-        evaluate(problem.rates, t, work.new_state, problem, work.stage_state)
-    evaluate(problem.reactions, t, work.new_state, problem, work.stage_state)
-    return pulled_back(work.stage_state, problem.joints, locked)
+        evaluate(problem.rates, t, work[NEW_STATE], problem, work[STAGE_STATE])
+    evaluate(problem.reactions, t, work[NEW_STATE], problem, work[STAGE_STATE])
+    return pulled_back(work[STAGE_STATE], problem.joints, locked)
 
 
 @inner
@@ -111,9 +114,9 @@ def crossed(y, limits, joints, joint):
 @inner
 def lock_touching(t, work, problem, limits, locked):
     """Lock the joints that start on a limit and press against it."""
-    joints, state = problem.joints, work.state
+    joints, state, rates = problem.joints, work[STATE], work[START_RATES]
     for _ in range(joints):
-        evaluate(problem.rates, t, state, problem, work.start_rates)
+        evaluate(problem.rates, t, state, problem, rates)
         changed = False
         for j in range(joints):
             if locked[j] != 0.0:
@@ -121,7 +124,7 @@ def lock_touching(t, work, problem, limits, locked):
             for side, limit in ((1.0, limits[joints + j]), (-1.0, limits[j])):
                 if side * (state[j] - limit) >= -TOUCH:
                     outward = side * state[joints + j]
-                    if outward > 0.0 or (outward == 0.0 and side * work.start_rates[joints + j] > 0.0):
+                    if outward > 0.0 or (outward == 0.0 and side * rates[joints + j] > 0.0):
                         locked[j] = side
                         state[j] = limit
                         changed = True
@@ -155,13 +158,9 @@ def crossing(start, gap, speed, end, end_gap, end_speed):
 
 
 @inner
-def meet_limit(t, h, method, work_, control, problem, limits, locked):
-    """Shorten a step of size h until the first joint that crosses its limit is on it; the size, and the joint.
-
-    work_: the array of `Work`.
-    """
-    joints, work = problem.joints, work_of(work_, problem, method)
-    state, new_state = work.state, work.new_state
+def meet_limit(t, h, method, work, control, problem, limits, locked):
+    """Shorten a step of size h until the first joint that crosses its limit is on it; the size, and the joint."""
+    joints, state, new_state = problem.joints, work[STATE], work[NEW_STATE]
     joint, side, limit = -1, 0.0, 0.0
     short, long = 0.0, h
     short_gap, short_speed, long_gap, long_speed = 0.0, 0.0, 0.0, 0.0
@@ -183,26 +182,25 @@ def meet_limit(t, h, method, work_, control, problem, limits, locked):
         if abs(gap) <= ON_LIMIT or long - short <= 1e-12 * max(1e-3, h):
             break
         h = crossing(short, short_gap, short_speed, long, long_gap, long_speed)
-        take_step(t, h, method, work_, control, problem)
+        take_step(t, h, method, work, control, problem)
     return h, joint
 
 
 @inner
-def leave_limit(t, h, pull, method, work_, control, problem, locked):
+def leave_limit(t, h, pull, method, work, control, problem, locked):
     """Shorten a step of size h, at whose end a joint is pulled off its limit by `pull` (N m), until it just is.
 
-    The size, and the joint. Illinois variant of false position. work_: the array of `Work`.
+    The size, and the joint. Illinois variant of false position.
     """
-    work = work_of(work_, problem, method)
-    evaluate(problem.rates, t, work.state, problem, work.stage_state)
-    evaluate(problem.reactions, t, work.state, problem, work.stage_state)
-    short_value = min(-1e-300, pulled_back(work.stage_state, problem.joints, locked)[1])
+    evaluate(problem.rates, t, work[STATE], problem, work[STAGE_STATE])
+    evaluate(problem.reactions, t, work[STATE], problem, work[STAGE_STATE])
+    short_value = min(-1e-300, pulled_back(work[STAGE_STATE], problem.joints, locked)[1])
     short, long, long_value = 0.0, h, pull
     joint = -1
     for _ in range(60):
         part = short_value / (short_value - long_value)
         h = short + min(0.99, max(0.01, part)) * (long - short)
-        take_step(t, h, method, work_, control, problem)
+        take_step(t, h, method, work, control, problem)
         joint, value = pull_behind(t + h, method, work, problem, locked)
         if value > 0.0:
             if value > 0.5 * long_value:
@@ -229,12 +227,12 @@ def limits_and_locked(problem):
 def settle(t, method_, work_, problem_):
     """Lock the joints that start on a limit and press against it, and stop those that move there."""
     method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
-    work = work_of(work_at(work_, problem, method), problem, method)
+    work = work_at(work_, problem, method)
     limits, locked = limits_and_locked(problem)
     lock_touching(t, work, problem, limits, locked)
     for j in range(problem.joints):
-        if locked[j] != 0.0 and work.state[problem.joints + j] != 0.0:
-            evaluate(problem.strike, t, work.state, problem, work.start_rates)
+        if locked[j] != 0.0 and work[STATE, problem.joints + j] != 0.0:
+            evaluate(problem.strike, t, work[STATE], problem, work[START_RATES])
             break
 
 
@@ -246,27 +244,26 @@ def find_event(t, h, method_, work_, control_, problem_):
     Until the time `control.quiet_until` no joint is released.
     """
     method, control, problem = carray(method_, 1)[0], carray(control_, 1)[0], carray(problem_, 1)[0]
-    rows, joints = work_at(work_, problem, method), problem.joints
-    work = work_of(rows, problem, method)
+    work, joints = work_at(work_, problem, method), problem.joints
     limits, locked = limits_and_locked(problem)
-    part = turning_point(work.state, work.new_state, limits, joints, locked, h)
+    part = turning_point(work[STATE], work[NEW_STATE], limits, joints, locked, h)
     if part > 0.0:
         # The ends of a step do not tell of a touch in between: look at the place at which the joint turns.
-        take_step(t, part * h, method, rows, control, problem)
-        if overshoot(work.new_state, limits, joints, locked)[1] > TOUCH:
+        take_step(t, part * h, method, work, control, problem)
+        if overshoot(work[NEW_STATE], limits, joints, locked)[1] > TOUCH:
             h = part * h
         else:
-            take_step(t, h, method, rows, control, problem)
+            take_step(t, h, method, work, control, problem)
     event = NOTHING
-    joint, value = overshoot(work.new_state, limits, joints, locked)
+    joint, value = overshoot(work[NEW_STATE], limits, joints, locked)
     if value > TOUCH:
         event = IMPACT
-        h, joint = meet_limit(t, h, method, rows, control, problem, limits, locked)
+        h, joint = meet_limit(t, h, method, work, control, problem, limits, locked)
     elif t + h > control.quiet_until and any_locked(locked):
         joint, value = pull_behind(t + h, method, work, problem, locked)
         if value > 0.0:
             event = RELEASE
-            h, joint = leave_limit(t, h, value, method, rows, control, problem, locked)
+            h, joint = leave_limit(t, h, value, method, work, control, problem, locked)
     control.event, control.joint, control.next_step = event, joint, h
 
 
@@ -275,13 +272,13 @@ def find_event(t, h, method_, work_, control_, problem_):
 def take_effect(t, method_, work_, control_, problem_):
     """What an event does to the state: an impact stops its joint and jolts the others."""
     method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
-    work = work_of(work_at(work_, problem, method), problem, method)
+    work = work_at(work_, problem, method)
     control = carray(control_, 1)[0]
     limits, locked = limits_and_locked(problem)
-    joint, state = control.joint, work.state
+    joint, state = control.joint, work[STATE]
     if control.event == RELEASE:
         locked[joint] = 0.0
         control.quiet_until = t + LEAST_FLIGHT
         return
     locked[joint], state[joint] = crossed(state, limits, problem.joints, joint)
-    evaluate(problem.strike, t, state, problem, work.stage_state)
+    evaluate(problem.strike, t, state, problem, work[STAGE_STATE])

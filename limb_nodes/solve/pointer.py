@@ -70,3 +70,15 @@ def numbers_at(typingctx, address):
         return builder.inttoptr(given[0], context.get_value_type(signature.return_type))
 
     return numbers(address), generate
+
+
+def _record_at(typingctx, address, kind):
+    """The record of a numba type at an address."""
+
+    def generate(context, builder, signature, given):
+        return builder.inttoptr(given[0], context.get_value_type(signature.return_type))
+
+    return kind.instance_type(address, kind), generate
+
+
+record_at: Any = intrinsic(_record_at)

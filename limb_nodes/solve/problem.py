@@ -1,18 +1,16 @@
 """What the integrators work with: the problem, how it is solved, how far the solution is.
 
 All functions of a problem are called by address as f(t, y, inputs, rows, model, data, out): time (s), state
-[states], the input's pieces [rows, columns], the limb's model and data, and the result, which the function fills in.
+[states], the input's pieces [rows, columns], addresses of the limb's model and data, and the result to be filled in.
 """
 
 from __future__ import annotations
-
-from typing import Any, NamedTuple
 
 import numpy as np
 from numba import carray, from_dtype, types
 
 from limb_nodes.foundation.arrays import FloatArray
-from limb_nodes.foundation.records import Record, new_record, whole_numbers
+from limb_nodes.foundation.records import Record, whole_numbers
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.pointer import f8, i8, invoke, numbers
 
@@ -60,53 +58,25 @@ problem_pointer, method_pointer, control_pointer = (
 )
 
 
-class Work(NamedTuple):
-    """The arrays of a step of n states, views of one array.
+# The types of the arguments of a problem's functions.
+FUNCTION = (f8, numbers, numbers, i8, i8, i8, numbers)
 
-    state, new_state: [n], at its start and its end. stage_state: [n], for which the rates are asked.
-    scale: [n], typical sizes. start_rates: [n], at its start. stages: [stages, n], rates or increments.
-    slopes: [n + 1, n], as the problem's jacobian gives them at its start; matrix: [n, n] and pivots: [n], factors
-    that are made of them; these three only of an implicit method.
-    """
 
-    state: Any
-    new_state: Any
-    stage_state: Any
-    scale: Any
-    start_rates: Any
-    stages: Any
-    slopes: Any
-    matrix: Any
-    pivots: Any
+# Rows of the array of a step [rows, n] of n states: at its start and its end, and for which the rates are asked;
+# their typical sizes; the rates at its start; then rates or increments of the method's stages. An implicit method has
+# n + 1 more rows for the slopes, as the problem's jacobian gives them at its start, and n + 1 for their factors.
+STATE, NEW_STATE, STAGE_STATE, SCALE, START_RATES, STAGES = 0, 1, 2, 3, 4, 5
 
 
 @inner
 def work_rows(problem, method):
-    """How many rows of n states the array of `Work` has."""
-    return 5 + method.stages + (2 * problem.states + 2) * method.implicit
-
-
-@inner
-def work_of(rows, problem, method):
-    """The parts of an array of `work_rows`."""
-    n, slopes = problem.states, 5 + method.stages
-    matrix = slopes + n + 1
-    return Work(
-        rows[0],
-        rows[1],
-        rows[2],
-        rows[3],
-        rows[4],
-        rows[5:slopes],
-        rows[slopes:matrix],
-        rows[matrix : matrix + n],
-        rows[matrix + n * method.implicit],
-    )
+    """How many rows the array of a step has."""
+    return STAGES + method.stages + (2 * problem.states + 2) * method.implicit
 
 
 @inner
 def work_at(pointer, problem, method):
-    """The array of `Work` at a pointer."""
+    """The array of a step at a pointer."""
     return carray(pointer, (work_rows(problem, method), problem.states))
 
 
@@ -118,28 +88,18 @@ def evaluate(function, t, y, problem, out):
 
 @inner
 def take_step(t, h, method, work, control, problem):
-    """One step of size h by the method's function. work: the array of `Work`."""
+    """One step of size h by the method's function. work: the array of the step."""
     invoke(method.step, t, h, method, work, control, problem)
-
-
-def arguments_of(model: Any, data: Any) -> tuple[Any, ...]:
-    """The numba types of the arguments of a problem's functions, for records of these types."""
-    return f8, numbers, numbers, i8, types.CPointer(model), types.CPointer(data), numbers
 
 
 def new_problem(states: int, rates: int, model: Record, data: Record) -> Record:
     """A problem without limits; `give_inputs` must follow. The caller keeps the records alive."""
-    problem = new_record(PROBLEM)
-    problem.states, problem.rates = states, rates
-    problem.model, problem.data = address_of(model), address_of(data)
+    problem = Record(PROBLEM)
+    problem.states[0], problem.rates[0] = states, rates
+    problem.model[0], problem.data[0] = model.address, data.address
     return problem
 
 
 def give_inputs(problem: Record, inputs: FloatArray) -> None:
     """Let a problem read these pieces [rows, columns]; the caller keeps them alive."""
-    problem.inputs, problem.rows = inputs.ctypes.data, len(inputs)
-
-
-def address_of(record: Record) -> int:
-    """Where the numbers of a record are."""
-    return int(np.frombuffer(record, np.uint8).ctypes.data)
+    problem.inputs[0], problem.rows[0] = inputs.ctypes.data, len(inputs)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from limb_nodes.foundation.arrays import FloatArray
-from limb_nodes.foundation.records import Record, new_record
+from limb_nodes.foundation.records import Record
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve.explicit import EXPLICIT
 from limb_nodes.solve.held import hold, predict
@@ -32,14 +32,19 @@ REHEARSAL = 1e-3
 
 def tick_control() -> Record:
     """How exactly a tick is solved."""
-    control = new_record(CONTROL)
-    control.tolerance = TICK_TOLERANCE
+    control = Record(CONTROL)
+    control.tolerance[0] = TICK_TOLERANCE
     return control
 
 
-def set_tick(control: Record, period: float) -> None:
-    """Let a tick of `period` (s) be solved next, in one step if it will do."""
-    control.end = control.longest = control.next_step = period
+def solve_tick(
+    method: Record, problem: Record, control: Record, scale: FloatArray, state: FloatArray, period: float
+) -> int:
+    """Advance a state by `period` (s) from time 0, in one step if it will do; the status of `integrate`."""
+    control.end[0] = control.longest[0] = control.next_step[0] = period
+    addresses = method.address, problem.address, control.address
+    status: int = integrate(*addresses, NO_TIMES, scale, state, NO_TIMES, NO_ROWS)
+    return status
 
 
 class MuscleStepper:
@@ -63,7 +68,7 @@ class MuscleStepper:
     def _start(self) -> None:
         """Fresh data, and the muscles alone as a problem of it."""
         layout = self.model.layout
-        self._data = self.model.new_data(0.0, 1.0)
+        self._data = self.model.new_data(1.0)
         rates = self.model.program.muscle_rates_c.address if layout.states else 0
         self._problem = new_problem(layout.states, rates, layout.model, self._data)
 
@@ -111,11 +116,11 @@ class MuscleStepper:
         if it is known; the input is then a parabola instead of a straight line.
         """
         self._set_state(angle, velocity)
-        self._data.period = period
+        self._data.period[0] = period
         out = np.empty((4, self.joints))
         model = self.model
         model.program.torque_slopes(
-            self._state, tick_input(last_drive, drive, next_drive), model.layout.model, self._data, out
+            self._state, tick_input(last_drive, drive, next_drive), model.layout.model.address, self._data.address, out
         )
         return out
 
@@ -142,16 +147,15 @@ class MuscleStepper:
         if self.internal.size == 0:
             return
         data = self._data
-        data.period = period
+        data.period[0] = period
         (data.angles_before[:], data.velocities_before[:]), (data.angles_after[:], data.velocities_after[:]) = (
             before,
             after,
         )
         inputs = tick_input(last_drive, drive, next_drive)
         give_inputs(self._problem, inputs)
-        set_tick(self._control, period)
-        scale, states = self.model.layout.state_scales, self.internal
-        status = integrate(EXPLICIT.free, self._problem, self._control, NO_TIMES, scale, states, NO_TIMES, NO_ROWS)
+        scale = self.model.layout.state_scales
+        status = solve_tick(EXPLICIT.free, self._problem, self._control, scale, self.internal, period)
         if status != DONE:
             raise SolveError(f"{self.model.limb.file}: the muscles cannot be advanced: {FAILURES[status]}")
 
@@ -162,7 +166,8 @@ class MuscleStepper:
         """
         self._set_state(angle, velocity)
         model = self.model
-        model.program.observe(self._state, excitation, model.layout.model, self._data, self._muscles, self._units)
+        records = model.layout.model.address, self._data.address
+        model.program.observe(self._state, excitation, *records, self._muscles, self._units)
         return self._muscles, self._units
 
 
@@ -190,7 +195,7 @@ class LimbStepper:
     def _start(self) -> None:
         """Fresh data, and the chain alone as a problem of it."""
         model = self.model
-        self._data = model.new_data(0.0, 1.0)
+        self._data = model.new_data(1.0)
         self._problem = new_problem(2 * self.joints, model.program.limb_rates_c.address, model.layout.model, self._data)
         model.limit(self._problem, self._data)
 
@@ -224,7 +229,7 @@ class LimbStepper:
         """Joint accelerations [n] (rad/s^2) at the current tick under rows of torque [4, n]."""
         data, model = self._data, self.model
         hold(torque, self._state, NO_TIMES, 1.0, data.held)
-        model.program.limb_rates(0.0, self._state, NO_ROWS, model.layout.model, data, self._rates)
+        model.program.limb_rates(0.0, self._state, NO_ROWS, model.layout.model.address, data.address, self._rates)
         return self._rates[self.joints :].copy()
 
     def step(self, torque: FloatArray, period: float) -> None:
@@ -232,9 +237,8 @@ class LimbStepper:
         data = self._data
         hold(torque, self._state, self._predicted, period, data.held)
         before = data.locked.copy()
-        set_tick(self._control, period)
         how = EXPLICIT.limited if self.model.limited else EXPLICIT.free
-        status = integrate(how, self._problem, self._control, NO_TIMES, self._scale, self._state, NO_TIMES, NO_ROWS)
+        status = solve_tick(how, self._problem, self._control, self._scale, self._state, period)
         if status != DONE:
             raise SolveError(f"{self.model.limb.file}: the limb cannot be advanced: {FAILURES[status]}")
         # An impact bends the torque at once, which tells nothing about the tick that follows.

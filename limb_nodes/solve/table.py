@@ -18,7 +18,8 @@ from numba import njit
 from limb_nodes.foundation.arrays import FloatArray, IntArray
 from limb_nodes.foundation.records import Record
 from limb_nodes.solve.inner import inner
-from limb_nodes.solve.problem import evaluate
+from limb_nodes.solve.pointer import record_at
+from limb_nodes.solve.problem import evaluate, problem_type
 
 TOLERANCE = 2e-13
 NODES = 8
@@ -84,8 +85,12 @@ def corner(problem, owner, values, left, right, scale, scratch):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def find_corners(problem, owners, values, span, scale, places):
-    """Fill places with those in the span at which values of an owner jump or bend; how many there are."""
+def find_corners(problem_, owners, values, span, scale, places):
+    """Fill places with those in the span at which values of an owner jump or bend; how many there are.
+
+    problem_: its address.
+    """
+    problem = record_at(problem_, problem_type)
     low, high = span
     scratch, coefficients = np.empty(problem.states), np.empty((scale.size, NODES))
     owner = np.zeros(1)
@@ -112,11 +117,12 @@ def find_corners(problem, owners, values, span, scale, places):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def fit(problem, number, breaks, values, scale, tolerance, edges, table):
+def fit(problem_, number, breaks, values, scale, tolerance, edges, table):
     """Fill edges [pieces + 1] and table [pieces, values, NODES] between breaks; how many pieces there are.
 
     The coefficients are NaN if no polynomial will do.
     """
+    problem = record_at(problem_, problem_type)
     owner, scratch = np.full(1, float(number)), np.empty(problem.states)
     least = LEAST_WIDTH * (breaks[-1] - breaks[0])
     pieces = 0
@@ -176,10 +182,10 @@ def tabulate(
     behind the last. scale: [values], their typical sizes; errors stay below tolerance * scale.
     """
     places = np.empty(MOST_PIECES // 2)
-    count = find_corners(*searched, values, span, scale, places)
+    count = find_corners(searched[0].address, searched[1], values, span, scale, places)
     breaks = np.unique(np.concatenate([span, places[:count]]))
     edges, table = np.empty(MOST_PIECES + 1), np.empty((MOST_PIECES, scale.size, NODES))
-    pieces = fit(problem, owner, breaks, values, scale, tolerance, edges, table)
+    pieces = fit(problem.address, owner, breaks, values, scale, tolerance, edges, table)
     edges = edges[: pieces + 1].copy()
     starts = np.empty(BUCKETS, dtype=np.int64)
     first_pieces(edges, starts)

@@ -12,8 +12,8 @@ import numpy as np
 
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
-from limb_nodes.foundation.records import Record, new_record
-from limb_nodes.model.chain import Chain, chain_of
+from limb_nodes.foundation.records import Record
+from limb_nodes.model.chain import LOWEST
 from limb_nodes.model.layout import Layout, build_layout
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve.compile import compiled
@@ -125,19 +125,14 @@ class WholeModel:
         )
 
     @cached_property
-    def chain(self) -> Chain:
-        """The constants of the chain of segments."""
-        return chain_of(self.layout.model.chain, self.layout.joints)
-
-    @cached_property
     def data_type(self) -> np.dtype[Any]:
         """The type of the limb's data."""
         return data_type(self.layout)
 
-    def new_data(self, start: float, period: float) -> Record:
-        """Fresh data with the limb's load, for input samples every `period` s from `start` (s) on."""
-        data = new_record(self.data_type)
-        data.start, data.period = start, period
+    def new_data(self, period: float) -> Record:
+        """Fresh data with the limb's load, for input samples every `period` s."""
+        data = Record(self.data_type)
+        data.period[0] = period
         data.load[:] = [*self.limb.tip_force, self.limb.tip_torque]
         return data
 
@@ -148,27 +143,28 @@ class WholeModel:
         """
         program = self.program
         problem = new_problem(self.state_scale.size, program.rates_c.address, self.layout.model, data)
-        problem.jacobian = program.jacobian_c.address if jacobian else 0
+        problem.jacobian[0] = program.jacobian_c.address if jacobian else 0
         self.limit(problem, data)
         return problem
 
     def limit(self, problem: Record, data: Record) -> None:
         """Let the joints of a problem have their limits, if the limb has some."""
         if self.limited:
-            problem.joints = self.layout.joints
-            problem.limits, problem.locked = self.chain.lowest.ctypes.data, data.locked.ctypes.data
-            problem.reactions, problem.strike = self.program.reactions_c.address, self.program.strike_c.address
+            lowest = self.layout.model.segments[LOWEST]
+            problem.joints[0] = self.layout.joints
+            problem.limits[0], problem.locked[0] = lowest.ctypes.data, data.locked.ctypes.data
+            problem.reactions[0], problem.strike[0] = self.program.reactions_c.address, self.program.strike_c.address
 
     def right_hand_side(self, inputs: FloatArray, period: float) -> Callable[[float, FloatArray], FloatArray]:
         """The rates [states] as a function of time (s) and state [states].
 
         inputs: pieces of the drives [rows, 4 drives], each as long as `period` (s).
         """
-        data, model, program = self.new_data(0.0, period), self.layout.model, self.program
+        data, model, program = self.new_data(period), self.layout.model, self.program
 
         def rates(t: float, y: FloatArray) -> FloatArray:
             out = np.empty(y.size)
-            program.rates(t, np.ascontiguousarray(y), inputs, model, data, out)
+            program.rates(t, np.ascontiguousarray(y), inputs, model.address, data.address, out)
             return out
 
         return rates
@@ -177,7 +173,8 @@ class WholeModel:
         """Slopes of the rates [states, states] (Jacobian) at a state under excitations [muscles]."""
         out = np.empty((state.size + 1, state.size))
         inputs = pieces(self.drives(excitation[np.newaxis, :]))
-        self.program.jacobian(0.0, state, inputs, self.layout.model, self.new_data(0.0, 1.0), out)
+        data = self.new_data(1.0)
+        self.program.jacobian(0.0, state, inputs, self.layout.model.address, data.address, out)
         return out[:-1].T
 
     def stiffness(self) -> float:
@@ -189,10 +186,10 @@ class WholeModel:
         state = self.initial_state()
         slopes = np.empty((state.size, state.size))
         inputs = pieces(self.drives(np.ones((1, self.layout.muscles))))
-        data = self.new_data(0.0, 1.0)
+        data = self.new_data(1.0)
         problem = self.problem(data)
         give_inputs(problem, inputs)
-        difference_slopes(problem, state, self.state_scale, slopes)
+        difference_slopes(problem.address, state, self.state_scale, slopes)
         return float(np.abs(np.linalg.eigvals(slopes)).max())
 
     @cached_property
@@ -211,7 +208,7 @@ class WholeModel:
         if len(given) >= self.table_pays:
             return self.drive_table.look_up(given)
         out = np.zeros((len(given), self.layout.drives))
-        self.program.drives(given, self.layout.model, out)
+        self.program.drives(given, self.layout.model.address, out)
         return out
 
     @cached_property
@@ -249,10 +246,11 @@ class WholeModel:
         muscle = np.zeros((shown, layout.muscles, len(MUSCLE_OUTPUTS)))
         unit = np.zeros((shown, layout.units, len(UNIT_OUTPUTS)))
         if observe:
-            data = self.new_data(0.0, period)
-            self.program.accelerations(times, states, stretch.inputs, layout.model, data, acceleration)
+            data = self.new_data(period)
+            records = layout.model.address, data.address
+            self.program.accelerations(times, states, stretch.inputs, *records, acceleration)
             given = np.ascontiguousarray(excitation, dtype=np.float64)
-            self.program.observe_all(states, given, layout.model, data, muscle, unit)
+            self.program.observe_all(states, given, *records, muscle, unit)
         return Movement(
             time=times,
             angle=states[:, :n],
@@ -274,17 +272,19 @@ class WholeModel:
         state = self.initial_state()
         out = np.empty((len(stretch.times), state.size))
         chosen = METHODS[self.suited_method if method == "auto" else method]
-        data = self.new_data(0.0, stretch.period)
+        data = self.new_data(stretch.period)
         problem = self.problem(data, jacobian=chosen.implicit)
         give_inputs(problem, stretch.inputs)
-        control = new_record(CONTROL)
-        control.start, control.end = stretch.times[0], stretch.times[-1]
-        control.tolerance, control.longest = tolerance, LONGEST_STEP
+        control = Record(CONTROL)
+        control.start[0], control.end[0] = stretch.times[0], stretch.times[-1]
+        control.tolerance[0], control.longest[0] = tolerance, LONGEST_STEP
         how = chosen.limited if self.limited else chosen.free
-        status = integrate(how, problem, control, stretch.stops, self.state_scale, state, stretch.times, out)
+        status = integrate(
+            how.address, problem.address, control.address, stretch.stops, self.state_scale, state, stretch.times, out
+        )
         if status != DONE:
-            raise SolveError(f"{self.limb.file}: the solution stops at {control.time:.6g} s: {FAILURES[status]}")
-        return out, (int(control.steps), int(control.rejected))
+            raise SolveError(f"{self.limb.file}: the solution stops at {control.time[0]:.6g} s: {FAILURES[status]}")
+        return out, (int(control.steps[0]), int(control.rejected[0]))
 
 
 def prepared(samples: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:

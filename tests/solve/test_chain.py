@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from limb_nodes.model import parse_limb
-from limb_nodes.model.chain import chain_block
+from limb_nodes.model.chain import segments_of, world_of
 from limb_nodes.solve import chain
 from limb_nodes.solve.whole import WholeModel
 from tests.independent.chain import points
@@ -102,9 +102,9 @@ class Mujoco:
 
 def joint_matrix(limb, angle: np.ndarray) -> np.ndarray:
     n = len(angle)
-    scratch = np.zeros(chain.scratch_size(n))
-    chain.joint_equations(chain_block(limb), np.zeros(3), angle, np.zeros(n), scratch)
-    return scratch[: n * n].reshape(n, n).copy()
+    scratch = np.zeros((chain.INERTIA + n, n))
+    chain.joint_equations(world_of(limb), segments_of(limb), np.zeros(3), np.append(angle, np.zeros(n)), scratch)
+    return scratch[chain.INERTIA :].copy()
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
@@ -112,11 +112,11 @@ def test_accelerations_are_those_of_mujoco(n):
     rng = np.random.default_rng(n)
     limb = limb_of(n, seed=n, tip=TIP)
     other = Mujoco(limb)
-    block, load, scratch = chain_block(limb), np.array(TIP), np.zeros(chain.scratch_size(n))
+    world, segments, load, scratch = world_of(limb), segments_of(limb), np.array(TIP), np.zeros((chain.INERTIA + n, n))
     for _ in range(20):
         angle, velocity, torque = rng.uniform(-3, 3, n), rng.uniform(-8, 8, n), rng.uniform(-20, 20, n)
         found = np.empty(n)
-        chain.acceleration(block, load, angle, velocity, torque, np.zeros(n), found, scratch)
+        chain.acceleration(world, segments, load, np.append(angle, velocity), torque, np.zeros(n), found, scratch)
         other.set(angle, velocity)
         np.testing.assert_allclose(found, other.acceleration(torque), rtol=1e-8, atol=1e-7)
         np.testing.assert_allclose(joint_matrix(limb, angle), other.matrix(), rtol=1e-9, atol=1e-12)
@@ -175,8 +175,9 @@ def test_an_impact_keeps_the_momenta_of_free_joints(n, seed, data):
     other = Mujoco(limb)
     other.set(angle, velocity)
     matrix = other.matrix()
-    after = velocity.copy()
-    chain.impact(chain_block(limb), np.zeros(3), angle, after, locked, np.zeros(chain.scratch_size(n)))
+    y = np.append(angle, velocity)
+    chain.impact(world_of(limb), segments_of(limb), np.zeros(3), y, locked, np.zeros((chain.INERTIA + n, n)))
+    after = y[n:]
     free = locked == 0.0
     np.testing.assert_array_equal(after[~free], 0.0)
     np.testing.assert_allclose((matrix @ after)[free], (matrix @ velocity)[free], rtol=1e-9, atol=1e-10)

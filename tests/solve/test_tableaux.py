@@ -12,6 +12,7 @@ import math
 import numpy as np
 import pytest
 
+from limb_nodes.solve import explicit, implicit
 from limb_nodes.solve.explicit import DORMAND_PRINCE
 from limb_nodes.solve.implicit import RODAS
 
@@ -67,7 +68,8 @@ def test_the_number_of_trees():
 
 
 class TestDormandPrince:
-    stages, nodes, error, bend = DORMAND_PRINCE
+    nodes, error, bend = (DORMAND_PRINCE[row] for row in (explicit.NODES, explicit.ERROR, explicit.BEND))
+    stages = DORMAND_PRINCE[explicit.WEIGHTS :]
 
     @pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
     def test_the_step_is_of_fifth_order(self, order):
@@ -105,15 +107,17 @@ class TestDormandPrince:
 class TestRodas:
     """alpha, gamma, b of IV.7 from the transformed coefficients: C = I / gamma - inverse of Gamma."""
 
-    diagonal = RODAS.couplings[0, 0]
-    gamma = np.linalg.inv(2.0 * np.diag(np.diag(RODAS.couplings)) - RODAS.couplings)
-    alpha = RODAS.stages @ gamma
-    weights = (RODAS.stages[-1] + np.eye(6)[-1]) @ gamma
-    embedded = RODAS.stages[-1] @ gamma
+    stages = RODAS[implicit.WEIGHTS :][:6]
+    couplings = RODAS[implicit.WEIGHTS :][6:]
+    diagonal = couplings[0, 0]
+    gamma = np.linalg.inv(2.0 * np.diag(np.diag(couplings)) - couplings)
+    alpha = stages @ gamma
+    weights = (stages[-1] + np.eye(6)[-1]) @ gamma
+    embedded = stages[-1] @ gamma
 
     def test_gamma(self):
         np.testing.assert_allclose(np.diag(self.gamma), 1.0 / self.diagonal, rtol=1e-14)
-        np.testing.assert_allclose(np.diag(RODAS.couplings), self.diagonal, rtol=0)
+        np.testing.assert_allclose(np.diag(self.couplings), self.diagonal, rtol=0)
 
     @pytest.mark.parametrize("order", [1, 2, 3, 4])
     def test_the_step_is_of_fourth_order(self, order):
@@ -128,8 +132,8 @@ class TestRodas:
         assert defect(self.embedded, order, self.alpha + self.gamma, self.alpha) < 1e-11
 
     def test_times_are_those_of_an_autonomous_system(self):
-        np.testing.assert_allclose(self.alpha.sum(axis=1), RODAS.nodes, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(self.gamma.sum(axis=1), RODAS.times, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(self.alpha.sum(axis=1), RODAS[implicit.NODES], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(self.gamma.sum(axis=1), RODAS[implicit.TIMES], rtol=0, atol=1e-12)
 
     @pytest.mark.parametrize("method", ["weights", "embedded"])
     def test_it_forgets_what_decays_at_once(self, method):
@@ -145,9 +149,9 @@ class TestRodas:
     @pytest.mark.parametrize("order", [1, 2, 3])
     @pytest.mark.parametrize("part", [0.2, 0.5, 0.9])
     def test_between_its_ends_the_solution_is_of_third_order(self, part, order):
-        increments = RODAS.stages[-1] + np.eye(6)[-1]
+        increments = self.stages[-1] + np.eye(6)[-1]
         rest = 1.0 - part
-        weights = part * (increments + rest * (RODAS.bend + part * RODAS.twist)) @ self.gamma
+        weights = part * (increments + rest * (RODAS[implicit.BEND] + part * RODAS[implicit.TWIST])) @ self.gamma
         worst = max(
             abs(weights @ grown(tree, self.alpha + self.gamma, self.alpha) - part**order / density(tree))
             for tree in trees(order)

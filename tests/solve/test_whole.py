@@ -1,10 +1,12 @@
 """The whole-model solve against scipy's, and what it shows against the equations."""
 
 import re
+from ctypes import c_char
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.np.numpy_support import as_dtype
 from scipy.integrate import solve_ivp
 
 from limb_nodes import solve
@@ -121,7 +123,8 @@ def test_the_loop_is_closed_anywhere(name, model_named):
     muscle = np.zeros((count, layout.muscles, len(MUSCLE_OUTPUTS)))
     unit = np.zeros((count, layout.units, len(UNIT_OUTPUTS)))
     excitation = rng.uniform(0.0, 1.0, (count, layout.muscles))
-    model.program.observe_all(states, excitation, layout.model, model.new_data(0.0, 1.0), muscle, unit)
+    data = model.new_data(1.0)
+    model.program.observe_all(states, excitation, layout.model.address, data.address, muscle, unit)
     total, each = muscle[:, :, MUSCLE_OUTPUTS.index("total_fibre_force")], unit[:, :, UNIT_OUTPUTS.index("fibre_force")]
     for m, columns in enumerate(unit_columns(limb)):
         solved = np.isfinite(total[:, m])
@@ -149,7 +152,8 @@ PERIOD = 1e-3
 def total_torque(model, y: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Torque about each joint and its slopes [4, n]."""
     out = np.empty((4, model.layout.joints))
-    model.program.torque_slopes(y, u, model.layout.model, model.new_data(0.0, PERIOD), out)
+    data = model.new_data(PERIOD)
+    model.program.torque_slopes(y, u, model.layout.model.address, data.address, out)
     return out
 
 
@@ -199,6 +203,12 @@ carray = None
 """
 
 
+def record_at(address: int, kind) -> np.record:
+    """The record of a numba type at an address, for Python."""
+    dtype = as_dtype(kind)
+    return np.frombuffer((c_char * dtype.itemsize).from_address(address), dtype).view(np.recarray)[0]
+
+
 def interpreted(model) -> dict:
     """The program of a model without compilation: its text, run by Python."""
     text = Path(model.program.__file__).read_text()
@@ -206,6 +216,7 @@ def interpreted(model) -> dict:
     assert count == 1
     space: dict = {}
     exec(compile(text, model.program.__file__, "exec"), space)
+    space["record_at"] = record_at
     for name, value in space.items():
         # Functions that compiled code alone may call.
         if getattr(value, "targetoptions", {}).get("no_cpython_wrapper"):
@@ -221,16 +232,18 @@ def test_compiled_equals_interpreted(name, model_named, waves):
     found = model.simulate(excitation, rate)
     program, space = Program(model, excitation, rate), interpreted(model)
     drives = np.zeros_like(program.drives)
-    space["drives"](excitation, layout.model, drives)
+    space["drives"](excitation, layout.model.address, drives)
     np.testing.assert_allclose(drives, program.drives, rtol=1e-13, atol=0)
     for row in (0, 25, 50):
         y = np.concatenate([found.angle[row], found.velocity[row], found.internal[row]])
         out = np.empty(y.size)
-        space["rates"](row / rate, y, program.u, layout.model, model.new_data(0.0, 1 / rate), out)
+        data = model.new_data(1 / rate)
+        space["rates"](row / rate, y, program.u, layout.model.address, data.address, out)
         np.testing.assert_allclose(out, program(row / rate, y), rtol=1e-9, atol=1e-9)
         u = np.ascontiguousarray(program.u[:1])
         slopes = np.empty((4, layout.joints))
-        space["torque_slopes"](y, u, layout.model, model.new_data(0.0, PERIOD), slopes)
+        data = model.new_data(PERIOD)
+        space["torque_slopes"](y, u, layout.model.address, data.address, slopes)
         np.testing.assert_allclose(slopes, total_torque(model, y, u), rtol=1e-8, atol=1e-8)
 
 
@@ -244,10 +257,10 @@ def test_many_groups_in_a_loop_and_few_written_out_are_alike(name, model_named, 
     inputs = pieces(written.drives(waves(np.arange(11) / 10.0, written.layout.muscles)))
     both = []
     for model in (written, looped):
-        y, data, program = model.initial_state(), model.new_data(0.0, 0.1), interpreted(model)
+        y, data, program = model.initial_state(), model.new_data(0.1), interpreted(model)
         out = np.empty((10, y.size))
         for row in range(10):
-            program["rates"](0.1 * row, y, inputs, model.layout.model, data, out[row])
+            program["rates"](0.1 * row, y, inputs, model.layout.model.address, data.address, out[row])
             y = y + 1e-3 * out[row]
         both.append(out)
     np.testing.assert_allclose(both[0], both[1], rtol=1e-12, atol=1e-12 * np.abs(both[0]).max())
@@ -285,7 +298,7 @@ def test_accelerations_are_those_of_the_motion(model_named, sine_cosine):
 def test_every_function_of_a_program_is_called(name, model_named):
     """What no limb calls is not generated: a function is named a second time, or is an entry for other modules."""
     text = Path(model_named(name).program.__file__).read_text()
-    entries = set(re.findall(r"@(?:entry|callback\(\*ARGUMENTS\))\ndef (\w+)", text))
+    entries = set(re.findall(r"@(?:entry|callback\(\*FUNCTION\))\ndef (\w+)", text))
     functions = re.findall(r"^def (\w+)", text, flags=re.MULTILINE)
     assert len(functions) > 40
     assert [one for one in functions if one not in entries and len(re.findall(rf"\b{one}\b", text)) < 2] == []

@@ -18,10 +18,10 @@ def solve(
     """States [T, states] at some times. method: "BDF" or "Adams"."""
     from sksundae.cvode import CVODE
 
-    rates, numbers, data = model.program.rates, model.layout.model, model.new_data(0.0, period)
+    rates, numbers, data = model.program.rates, model.layout.model.address, model.new_data(period)
 
     def right_hand_side(t: float, y: FloatArray, out: FloatArray) -> None:
-        rates(t, y, inputs, numbers, data, out)
+        rates(t, y, inputs, numbers, data.address, out)
 
     solver: Any = CVODE(
         right_hand_side,
