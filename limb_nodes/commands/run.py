@@ -40,12 +40,14 @@ def run(args: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from limb_nodes.foundation.parameter import Parameter
-    from limb_nodes.nodes.session import Run, checked, run_in_one_process, run_in_processes
+    from limb_nodes.nodes.base import STATES
+    from limb_nodes.nodes.session import run_in_one_process, run_in_processes
+    from limb_nodes.nodes.settings import RunSettings, checked
 
     if args.duration is not None:
         Parameter("duration", "s", "simulated time", above=0.0).check(args.duration)
     Parameter("state_every", "1", "ticks", minimum=1, maximum=1e6, integer=True).check(args.state_every)
-    settings = Run(
+    settings = RunSettings(
         limb=args.limb,
         source=args.source,
         rate=args.rate,
@@ -53,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         out=args.out,
         mode=args.mode,
         namespace=args.namespace,
-        states=() if args.no_states else Run.states,
+        states=() if args.no_states else STATES,
         state_every=args.state_every,
         command=shlex.join(["limb", *sys.argv[1:]]),
     )

@@ -112,7 +112,9 @@ def solve_graph(case: Case, limb: Limb) -> Trajectory:
     """Run a case by the nodes, in one process, into a bag that lives as long as this takes."""
     from limb_nodes.analysis.trajectory import trajectory_of_bag
     from limb_nodes.analysis.verification import RATE
-    from limb_nodes.nodes.session import Run, run_in_one_process
+    from limb_nodes.nodes.base import STATES
+    from limb_nodes.nodes.session import run_in_one_process
+    from limb_nodes.nodes.settings import RunSettings
     from limb_nodes.solve.whole import SolveError
 
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
@@ -120,7 +122,7 @@ def solve_graph(case: Case, limb: Limb) -> Trajectory:
         file, source, bag = (Path(folder) / name for name in ("limb.yaml", "activation.csv", "bag"))
         write_limb(limb, file)
         write_activation(case, limb, source)
-        settings = Run(
+        settings = RunSettings(
             limb=str(file),
             source=str(source),
             rate=RATE,
@@ -128,7 +130,7 @@ def solve_graph(case: Case, limb: Limb) -> Trajectory:
             out=str(bag),
             # No other run, and no case before this one, is heard here.
             namespace=f"/limb_verify_{os.getpid()}_{case.name.replace('.', '_').replace('-', '_')}",
-            states=Run.states if case.states else (),
+            states=STATES if case.states else (),
             command=shlex.join(["limb", *sys.argv[1:]]),
         )
         try:

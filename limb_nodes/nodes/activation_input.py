@@ -10,9 +10,9 @@ from sensor_msgs.msg import JointState
 
 from limb_nodes.errors import UserError
 from limb_nodes.nodes.base import LimbNode
-from limb_nodes.nodes.qos import LIVE, STREAM
+from limb_nodes.nodes.qos import LIVE
 from limb_nodes.nodes.running import main_of
-from limb_nodes.nodes.wire import Incoming, Outgoing
+from limb_nodes.nodes.wire import Incoming
 from limb_nodes.signals.activation import Activation, load_activation
 
 
@@ -58,19 +58,18 @@ class ActivationInput(LimbNode):
             name=self.muscles,
             activation=[0.0] * len(self.muscles),
         )
-        publisher = self.create_publisher(MuscleActivation, "activation", STREAM)
-        self.activation = Outgoing(publisher, example, self.ticks.nanoseconds)
+        self.activation = self.outgoing("activation", example)
         self.joint_states = Incoming(JointState, "name", self.ticks.nanoseconds)
         zeros = [0.0] * len(self.limb.joint_names)
         self.joint_states.expect(JointState(name=self.limb.joint_names, position=zeros, velocity=zeros))
-        self.listen(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
+        self.listen_to_run(JointState, "joint_states", self.on_joint_states)
 
     def hear_envelopes(self) -> None:
         """Subscribe the live envelopes."""
         self.envelopes = self.listen(MuscleActivation, "emg_envelope", self.on_envelope, LIVE)
 
     def on_envelope(self, message: MuscleActivation) -> None:
-        """Take over a live envelope where every value is good."""
+        """Take over a live envelope if every value is good."""
         whole = len(message.name) == len(message.activation)
         given = dict(zip(message.name, message.activation, strict=True)) if whole else {}
         values = np.array([given.get(name, np.nan) for name in self.muscles])
@@ -79,8 +78,8 @@ class ActivationInput(LimbNode):
             self.newest = values
             return
         name = self.muscles[int(np.flatnonzero(~good)[0])]
-        found = f"is {given[name]:g}" if name in given else "is missing"
-        self.complain(f"emg_envelope: {name} {found}, a number from 0 to 1 is needed")
+        value = f"is {given[name]:g}" if name in given else "is missing"
+        self.complain(f"emg_envelope: {name} {value}; a number from 0 to 1 is needed")
 
     def on_joint_states(self, data: bytes) -> None:
         """Send what the tick of the message and the next one need."""

@@ -16,24 +16,31 @@ from std_msgs.msg import Header
 
 from limb_nodes.errors import UserError
 from limb_nodes.model import Limb, load_limb
-from limb_nodes.nodes.qos import LIVE
+from limb_nodes.nodes.distribution import given_parameters
+from limb_nodes.nodes.identity import FORM, FRAME, frame_of, identity_of, is_identity
+from limb_nodes.nodes.qos import LIVE, STREAM
 from limb_nodes.nodes.ticks import Ticks
+from limb_nodes.nodes.wire import Outgoing
 
 MODES = ("lockstep", "realtime")
 NODES = ("activation_input", "muscle_stack", "limb_dynamics", "recorder")
-FAREWELL = "at the end of the run"
+# Topics that muscle_stack publishes on request.
+STATES = ("muscle_state", "motor_unit_state", "sarcomere_state")
 
 
 class LimbNode(Node):
     """A node of one limb at one rate.
 
-    finished: whether the node has done its part of the run. failure: why it cannot go on, for whoever spins
-    it; a text, because an error would keep the node and all that it knows alive. bad_input: messages that
-    could not be used.
+    identity: of the run that the node belongs to; empty until it is known. finished: whether the node has done its
+    part of the run. failure: why it cannot go on, for whoever spins it; a text, because an error would keep the node
+    and all that it knows alive. bad_input: messages that could not be used.
     """
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
+        self.identity = ""
+        self._frame = b""
+        self._outgoing: list[Outgoing] = []
         self.finished = False
         self.failure = ""
         self.bad_input = 0
@@ -46,6 +53,53 @@ class LimbNode(Node):
         self.limb: Limb = load_limb(path)
         self.mode = self.choice("mode", MODES, "lockstep: tick after tick as fast as possible; realtime: by the clock")
         self.ticks = Ticks(self.number("rate", 1000.0, "ticks per second of simulation time", 0.0, 100_000.0))
+        self.given_identity = self.text(
+            "identity", "", f"identity of the run, {FORM}; empty: a new one (limb_dynamics), that of the run (others)"
+        )
+        if self.given_identity:
+            if not is_identity(self.given_identity):
+                raise UserError(f"{name}: the parameter identity is {self.given_identity!r}; {FORM} are needed")
+            self.join(self.given_identity)
+
+    def join(self, identity: str) -> None:
+        """Belong to a run from now on."""
+        self.identity, self._frame = identity, frame_of(identity)
+        for messages in self._outgoing:
+            messages.identify(self._frame)
+
+    def owns(self, data: bytes) -> bool:
+        """Whether a serialised message belongs to the node's run.
+
+        A node without a run joins that of the first message that it asks about.
+        """
+        frame = data[FRAME]
+        if frame == self._frame:
+            return True
+        identity = identity_of(frame)
+        if identity and not self.identity:
+            self.join(identity)
+            return True
+        if not identity:
+            self.complain("a message has no identity of a run in header.frame_id")
+        return False
+
+    def outgoing(self, topic: str, example: Any) -> Outgoing:
+        """The messages of the run that the node publishes on a topic, all like an example."""
+        publisher = self.create_publisher(type(example), topic, STREAM)
+        messages = Outgoing(publisher, example, self.ticks.nanoseconds)
+        if self.identity:
+            messages.identify(self._frame)
+        self._outgoing.append(messages)
+        return messages
+
+    def listen_to_run(self, kind: type, topic: str, callback: Callable[[bytes], None]) -> None:
+        """Subscribe a topic of the run; the callback gets serialised messages, of this run alone."""
+
+        def own(data: bytes) -> None:
+            if self.owns(data):
+                callback(data)
+
+        self.listen(kind, topic, own, STREAM, raw=True)
 
     def text(self, name: str, default: str, meaning: str) -> str:
         """A parameter that holds a text, fixed at the start."""
@@ -56,22 +110,23 @@ class LimbNode(Node):
         """A parameter that holds one of some texts, the first by default."""
         value = self.text(name, allowed[0], f"{meaning} (one of {', '.join(allowed)})")
         if value not in allowed:
-            raise UserError(f"{self.get_name()}: the parameter {name} is {value!r}; allowed: {', '.join(allowed)}")
+            raise UserError(
+                f"{self.get_name()}: the parameter {name} is {value!r}; one of {', '.join(allowed)} is needed"
+            )
         return value
 
     def number(self, name: str, default: float, meaning: str, lowest: float, highest: float) -> float:
         """A parameter that holds a number within a range."""
         span = FloatingPointRange(from_value=lowest, to_value=highest)
         descriptor = ParameterDescriptor(description=meaning, read_only=True, floating_point_range=[span])
-        given = self._parameter_overrides.get(name)
-        if given is not None and given.type_ == Parameter.Type.INTEGER:
+        given = given_parameters(self)
+        if name in given and given[name].type_ == Parameter.Type.INTEGER:
             # ROS tells 200 from 200.0; a person does not.
-            self._parameter_overrides[name] = Parameter(name, value=float(given.value))
-        value = float(self._declare(name, default, descriptor, f"a number from {lowest:g} to {highest:g}"))
+            given[name] = Parameter(name, value=float(given[name].value))
+        allowed = f"a number from {lowest:g} to {highest:g}"
+        value = float(self._declare(name, default, descriptor, allowed))
         if not lowest <= value <= highest:
-            raise UserError(
-                f"{self.get_name()}: {name} is {value:g}; a number from {lowest:g} to {highest:g} is needed"
-            )
+            raise UserError(f"{self.get_name()}: the parameter {name} is {value:g}; {allowed} is needed")
         return value
 
     def whole(self, name: str, default: int, meaning: str, lowest: int, highest: int) -> int:
@@ -85,13 +140,13 @@ class LimbNode(Node):
         descriptor = ParameterDescriptor(description=meaning, read_only=True)
         return bool(self._declare(name, default, descriptor, "true or false"))
 
-    def _declare(self, name: str, default: Any, descriptor: ParameterDescriptor, needed: str) -> Any:
+    def _declare(self, name: str, default: Any, descriptor: ParameterDescriptor, allowed: str) -> Any:
         try:
             return self.declare_parameter(name, default, descriptor).value
         except Exception as problem:
-            given = [p.value for p in self._parameter_overrides.values() if p.name == name]
-            found = f"is {given[0]!r}" if given else f"cannot be read ({problem})"
-            raise UserError(f"{self.get_name()}: the parameter {name} {found}; {needed} is needed") from None
+            given = given_parameters(self).get(name)
+            value = f"is {given.value!r}" if given is not None else f"cannot be read ({problem})"
+            raise UserError(f"{self.get_name()}: the parameter {name} {value}; {allowed} is needed") from None
 
     def complain(self, what: str) -> None:
         """Count a message that cannot be used, and say so once per second at most."""
@@ -131,8 +186,3 @@ class LimbNode(Node):
         if self.bad_input > self._told:
             self.diagnose(f"{self.bad_input} messages could not be used", bad=True)
         super().destroy_node()
-
-
-def finite(*fields: Sequence[float]) -> bool:
-    """Whether all numbers of some fields are finite."""
-    return all(math.isfinite(value) for field in fields for value in field)

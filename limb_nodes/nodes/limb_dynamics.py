@@ -12,16 +12,17 @@ from geometry_msgs.msg import Point, WrenchStamped
 from limb_msgs.msg import JointTorque, MovementPattern
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Int64, String
+from std_msgs.msg import Header, String
 
 from limb_nodes.errors import UserError
 from limb_nodes.model.points import point_names, points
-from limb_nodes.nodes.base import LimbNode, finite
+from limb_nodes.nodes.base import LimbNode
+from limb_nodes.nodes.identity import comes_before, new_claim, new_identity
 from limb_nodes.nodes.qos import LATCHED, LIVE, RECORDER_LAG, STREAM
 from limb_nodes.nodes.running import main_of
 from limb_nodes.nodes.urdf import urdf
 from limb_nodes.nodes.wire import Incoming, Outgoing
-from limb_nodes.solve.small import finite as sound
+from limb_nodes.solve.small import finite
 from limb_nodes.solve.stepping import LimbStepper
 
 TORQUE_FIELDS = ("torque", "slope_angle", "slope_velocity", "slope_time")
@@ -36,8 +37,9 @@ class LimbDynamics(LimbNode):
 
     In lockstep joint_torque k leads to joint_states k + 1. In real time a wall timer at the fixed
     rate does, with the newest torque; ticks whose torque is not there in time are counted.
-    Subscribes `joint_torque` and `external_load`; publishes `joint_states`, `movement_pattern`,
-    `robot_description` and `/diagnostics`.
+    It claims the namespace for its run, and ends if another run's claim comes before.
+    Subscribes `joint_torque`, `external_load` and `run_identity`; publishes `run_identity`, `joint_states`,
+    `movement_pattern`, `robot_description` and `/diagnostics`.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -45,6 +47,8 @@ class LimbDynamics(LimbNode):
         self.awaits_recorder = self.switch(
             "await_recorder", False, "start with the recorder and never run farther ahead than it can take"
         )
+        if not self.identity:
+            self.join(new_identity())
         self.stepper = LimbStepper(self.limb)
         self.joints = self.limb.joint_names
         self.tick = 0
@@ -65,10 +69,14 @@ class LimbDynamics(LimbNode):
         self.torque.expect(JointTorque(joint=self.joints, **dict.fromkeys(TORQUE_FIELDS, zeros)))
         self.description = self.create_publisher(String, "robot_description", LATCHED)
         self.description.publish(String(data=urdf(self.limb)))
-        self.listen(JointTorque, "joint_torque", self.on_torque, STREAM, raw=True)
+        self.claims = self.create_publisher(Header, "run_identity", LATCHED)
+        self.claim = new_claim(self.identity)
+        self.claims.publish(self.claim)
+        self.listen(Header, "run_identity", self.on_claim, STREAM)
+        self.listen_to_run(JointTorque, "joint_torque", self.on_torque)
         self.listen(WrenchStamped, "external_load", self.on_load, LIVE)
         if self.awaits_recorder:
-            self.listen(Int64, "recorder_progress", self.on_recorded, LATCHED)
+            self.listen(Header, "recorder_progress", self.on_recorded, STREAM)
         else:
             self.offer()
         if self.mode == "realtime":
@@ -89,11 +97,7 @@ class LimbDynamics(LimbNode):
             point=points_of,
             position=[Point() for _ in points_of],
         )
-        nanoseconds = self.ticks.nanoseconds
-        return (
-            Outgoing(self.create_publisher(JointState, "joint_states", STREAM), states, nanoseconds),
-            Outgoing(self.create_publisher(MovementPattern, "movement_pattern", STREAM), pattern, nanoseconds),
-        )
+        return self.outgoing("joint_states", states), self.outgoing("movement_pattern", pattern)
 
     def offer(self) -> None:
         """Publish the joint states of the current tick."""
@@ -101,11 +105,24 @@ class LimbDynamics(LimbNode):
         values["position"][:], values["velocity"][:] = self.stepper.angle, self.stepper.velocity
         self.joint_states.publish(self.tick)
 
-    def on_recorded(self, message: Int64) -> None:
+    def on_claim(self, other: Header) -> None:
+        """Give way to a run that claimed before; tell one that did not again whose the namespace is."""
+        if other.frame_id == self.identity:
+            return
+        if comes_before(other, self.claim):
+            raise UserError(
+                f"namespace is {self.get_namespace()}, in which the run {other.frame_id} is in place; another "
+                "namespace, or another ROS_DOMAIN_ID, is needed"
+            )
+        self.claims.publish(self.claim)
+
+    def on_recorded(self, message: Header) -> None:
         """The recorder has every tick up to this one; -1 when it is ready."""
+        if message.frame_id != self.identity:
+            return
         first = self.recorded < 0 and self.tick == 0 and not self.history
-        self.recorded = message.data
-        if first and message.data < 0:
+        self.recorded = self.ticks.tick(message.stamp)
+        if first and self.recorded < 0:
             self.history[-1] = self.stepper.angle.copy(), self.stepper.velocity.copy()
             self.offer()
         elif self.pending is not None and self.tick - self.recorded <= RECORDER_LAG:
@@ -115,7 +132,7 @@ class LimbDynamics(LimbNode):
     def on_load(self, message: WrenchStamped) -> None:
         """Take over force and torque on the tip."""
         force, torque = message.wrench.force, message.wrench.torque
-        values = force.x, force.y, torque.z
+        values = np.array([force.x, force.y, torque.z])
         if finite(values):
             self.stepper.load[:] = values
         else:
@@ -135,8 +152,8 @@ class LimbDynamics(LimbNode):
             rows[:] = fields
         else:
             rows[:] = np.nan
-        if not sound(rows.reshape(-1)):
-            self.complain(f"joint_torque of tick {tick}: finite numbers for {', '.join(self.joints)} needed")
+        if not finite(rows.reshape(-1)):
+            self.complain(f"joint_torque of tick {tick}: finite numbers for {', '.join(self.joints)} are needed")
             return
         self.last_tick = int(message["last_tick"][0])
         if self.mode == "realtime":
@@ -250,7 +267,7 @@ class LimbDynamics(LimbNode):
             self.get_logger().warning(message)
 
     def destroy_node(self) -> None:
-        """Tell how real time was kept where the run is ended before its last tick."""
+        """Tell how real time was kept if the run is ended before its last tick."""
         if self.started_at is not None and not self.finished:
             self.report()
         super().destroy_node()

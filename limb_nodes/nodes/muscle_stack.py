@@ -9,7 +9,6 @@ from limb_msgs.msg import JointTorque, MotorUnitState, MuscleActivation, MuscleS
 from sensor_msgs.msg import JointState
 
 from limb_nodes.nodes.base import LimbNode
-from limb_nodes.nodes.qos import STREAM
 from limb_nodes.nodes.running import main_of
 from limb_nodes.nodes.wire import Incoming, Outgoing
 from limb_nodes.solve.outputs import (
@@ -48,17 +47,17 @@ class MuscleStack(LimbNode):
         zeros = [0.0] * n
         example = JointTorque(joint=joints, torque=zeros, slope_angle=zeros, slope_velocity=zeros, slope_time=zeros)
         nanoseconds = self.ticks.nanoseconds
-        self.torque = Outgoing(self.create_publisher(JointTorque, "joint_torque", STREAM), example, nanoseconds)
+        self.torque = self.outgoing("joint_torque", example)
         self.states = self.state_topics()
         self.activation = Incoming(MuscleActivation, "name", nanoseconds)
         self.activation.expect(MuscleActivation(name=self.muscles, activation=[0.0] * len(self.muscles)))
         self.joint_states = Incoming(JointState, "name", nanoseconds)
         self.joint_states.expect(JointState(name=joints, position=zeros, velocity=zeros))
-        self.listen(MuscleActivation, "activation", self.on_activation, STREAM, raw=True)
-        self.listen(JointState, "joint_states", self.on_joint_states, STREAM, raw=True)
+        self.listen_to_run(MuscleActivation, "activation", self.on_activation)
+        self.listen_to_run(JointState, "joint_states", self.on_joint_states)
 
     def state_topics(self) -> list[tuple[Outgoing, list[tuple[np.ndarray, np.ndarray]]]]:
-        """The topics of states that are switched on: messages, and pairs of what to copy where."""
+        """The topics of states that are switched on: messages, and pairs of target and source to copy."""
         muscles, units = self.stepper.shown
         of_unit = {
             "muscle": [muscle.name for muscle in self.limb.muscles for _ in muscle.units],
@@ -68,19 +67,12 @@ class MuscleStack(LimbNode):
         for topic, kind, texts, fields, outputs, shown in (
             ("muscle_state", MuscleState, {"name": self.muscles}, MUSCLE_FIELDS, MUSCLE_OUTPUTS, muscles),
             ("motor_unit_state", MotorUnitState, of_unit, UNIT_FIELDS, UNIT_OUTPUTS, units),
-            (
-                "sarcomere_state",
-                SarcomereState,
-                of_unit,
-                SARCOMERE_FIELDS,
-                UNIT_OUTPUTS,
-                units,
-            ),
+            ("sarcomere_state", SarcomereState, of_unit, SARCOMERE_FIELDS, UNIT_OUTPUTS, units),
         ):
             if not self.switch(f"publish_{topic}", True, f"whether to publish {topic}"):
                 continue
             example = kind(**texts, **{field: [0.0] * len(shown) for field in fields})
-            message = Outgoing(self.create_publisher(kind, topic, STREAM), example, self.ticks.nanoseconds)
+            message = self.outgoing(topic, example)
             copies = [(message.values[field], shown[:, outputs.index(name)]) for field, name in fields.items()]
             topics.append((message, copies))
         return topics
@@ -168,7 +160,7 @@ class MuscleStack(LimbNode):
 
 
 def in_order(message: Incoming, field: str, names: list[str]) -> np.ndarray:
-    """Numbers of a message in the order of `names`, NaN for those that it lacks, or all where it is malformed."""
+    """Numbers of a message in the order of `names`, NaN for those that it lacks, or all if it is malformed."""
     values = message[field]
     if len(values) != len(message.names):
         return np.full(len(names), np.nan)

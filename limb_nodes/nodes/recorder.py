@@ -23,9 +23,10 @@ from limb_msgs.msg import (
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
+from rclpy.serialization import serialize_message
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Int64, String
+from std_msgs.msg import Header, String
 
 from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.bags.versions import versions
@@ -33,7 +34,8 @@ from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.topics import LATCHED_TOPICS, TOPIC_TYPES
 from limb_nodes.model import user_sources
-from limb_nodes.nodes.base import NODES, LimbNode
+from limb_nodes.nodes.base import NODES, STATES, LimbNode
+from limb_nodes.nodes.distribution import parameter_values, taken
 from limb_nodes.nodes.qos import EVERY, LATCHED, STREAM
 from limb_nodes.nodes.running import main_of
 from limb_nodes.nodes.wire import stamp_of
@@ -47,7 +49,6 @@ TICKED = {
     "motor_unit_state": MotorUnitState,
     "sarcomere_state": SarcomereState,
 }
-STATES = ("muscle_state", "motor_unit_state", "sarcomere_state")
 OTHERS = {"emg_envelope": MuscleActivation, "external_load": WrenchStamped, "/diagnostics": DiagnosticArray}
 # How often the topics are emptied (s). An executor would take three times as long for each message.
 POLL_PERIOD = 0.005
@@ -60,8 +61,8 @@ ASK_AGAIN = 1.0
 class Recorder(LimbNode):
     """Subscribes every topic and writes each tick once.
 
-    Publishes `recorder_progress`: -1 when it is ready, then the newest tick that it has on every
-    topic. Finished when the last tick of the run is in the bag on every topic.
+    Publishes `recorder_progress`, the identity of the run and a time: of tick -1 when it is ready, then of the newest
+    tick that it has on every topic. Finished when the last tick of the run is in the bag on every topic.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -79,11 +80,11 @@ class Recorder(LimbNode):
         self.expected = {topic: 1 for topic in TICKED if topic not in STATES}
         self.last_tick = -1
         self.announced = -2
-        self.parameters: dict[str, dict[str, Any]] = {"recorder": own_parameters(self)}
+        self.parameters: dict[str, dict[str, Any]] = {"recorder": parameter_values(self)}
         self.askers: dict[str, AsyncParameterClient] = {}
         self.asked: dict[str, float] = {}
         self.first_message: float | None = None
-        self.progress = self.create_publisher(Int64, "recorder_progress", LATCHED)
+        self.progress = self.create_publisher(Header, "recorder_progress", LATCHED)
         self.ticked = {
             topic: self.create_subscription(kind, topic, refuse, STREAM, raw=True) for topic, kind in TICKED.items()
         }
@@ -93,7 +94,16 @@ class Recorder(LimbNode):
         self.create_timer(POLL_PERIOD, self.on_poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.description: str | None = None
         self.listen(String, "robot_description", self.on_description, LATCHED)
+        if not self.identity:
+            self.listen(Header, "run_identity", self.on_claim, STREAM)
         self.asking = self.create_timer(0.05, self.ask)
+
+    def on_claim(self, claim: Header) -> None:
+        """Without an identity of its own, record the run that was heard of last, until its first message is there."""
+        if claim.frame_id != self.identity and self.first_message is None:
+            self.join(claim.frame_id)
+            self.announced = -2
+            self.announce()
 
     def on_description(self, message: String) -> None:
         """Write the robot description, or keep it until the bag is open."""
@@ -132,7 +142,10 @@ class Recorder(LimbNode):
     def on_values(self, node: str, names: list[str], future: Any) -> None:
         """Keep the values of a node's parameters."""
         values = [parameter_value_to_python(value) for value in future.result().values]
-        self.parameters[node] = dict(zip(names, values, strict=True))
+        parameters = dict(zip(names, values, strict=True))
+        # If a node of another run has answered, the node is asked again.
+        if parameters.get("identity") in (self.given_identity, self.identity):
+            self.parameters[node] = parameters
 
     def open(self) -> None:
         """Make the bag, write what has come so far, and say that the run may start."""
@@ -152,8 +165,6 @@ class Recorder(LimbNode):
 
     def write(self, topic: str, stamp: int, message: Any) -> None:
         """Write a message of rclpy."""
-        from rclpy.serialization import serialize_message
-
         assert self.writer is not None
         self.writer.write_raw(topic, stamp, serialize_message(message), TOPIC_TYPES[topic])
 
@@ -210,7 +221,7 @@ class Recorder(LimbNode):
         for data in arrived:
             stamp = stamp_of(data)
             tick = round(stamp / nanoseconds)
-            if tick > newest:
+            if tick > newest and self.owns(data):
                 newest = tick
                 messages.append((stamp, data))
         self.newest[topic] = newest
@@ -225,7 +236,7 @@ class Recorder(LimbNode):
 
     def announce(self) -> None:
         """Publish the newest tick that is there on every topic."""
-        if self.writer is None:
+        if self.writer is None or not self.identity:
             return
         complete = min(
             self.newest[topic] + every - 1 if self.newest[topic] >= 0 else -1 for topic, every in self.expected.items()
@@ -233,7 +244,8 @@ class Recorder(LimbNode):
         self.finished = 0 <= self.last_tick <= complete
         if complete > self.announced:
             self.announced = complete
-            self.progress.publish(Int64(data=complete if complete >= 0 and self.counts["joint_states"] else -1))
+            tick = complete if self.counts["joint_states"] else -1
+            self.progress.publish(Header(frame_id=self.identity, stamp=self.ticks.stamp(tick)))
 
     def missing(self) -> int:
         """Ticks that are not in the bag on a topic that should have them."""
@@ -253,13 +265,6 @@ class Recorder(LimbNode):
             super().destroy_node()
 
 
-def taken(subscription: Subscription[Any]) -> Iterator[bytes]:
-    """The serialised messages that have come on a topic that is polled."""
-    take, kind = subscription.handle.take_message, subscription.msg_type
-    while (found := take(kind, True)) is not None:
-        yield found[0]
-
-
 def refuse(message: bytes) -> None:
     """The callback of a topic that is polled."""
     raise AssertionError("an executor has taken a message of the recorder")
@@ -269,13 +274,8 @@ def last_tick(data: bytes) -> int:
     """The field `last_tick` of a serialised JointTorque: behind the header and the tick."""
     (length,) = struct.unpack_from("<I", data, 12)
     tick = -(-(12 + length) // 8) * 8
-    (found,) = struct.unpack_from("<q", data, 4 + tick + 8)
-    return int(found)
-
-
-def own_parameters(node: LimbNode) -> dict[str, Any]:
-    """The parameters of this node."""
-    return {name: parameter.value for name, parameter in node._parameters.items()}
+    (last,) = struct.unpack_from("<q", data, 4 + tick + 8)
+    return int(last)
 
 
 main: Callable[..., None] = main_of(Recorder)

@@ -13,27 +13,20 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.exceptions import InvalidNamespaceException
-from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import Executor, ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_namespace import validate_namespace
 
 from limb_nodes.errors import FieldError, UserError
+from limb_nodes.nodes.distribution import make_executor
 
 # The executor is asked for one event at a time with a time-out: without one it hangs when idle.
 SPIN_TIMEOUT = 0.05
 # The variable by which a run tells the nodes in processes of their own whose children they are: they end with it.
 PARENT = "LIMB_RUN_PARENT"
-
-
-def make_executor(context: Context) -> Executor:
-    """The events executor, or the single-threaded one where rclpy has no other."""
-    try:
-        from rclpy.experimental import EventsExecutor
-    except ImportError:
-        return SingleThreadedExecutor(context=context)
-    return EventsExecutor(context=context)
 
 
 def spin(executor: Executor, done: Callable[[], bool]) -> None:
@@ -44,7 +37,7 @@ def spin(executor: Executor, done: Callable[[], bool]) -> None:
 
 
 def check_namespace(namespace: str) -> None:
-    """Raise FieldError if ROS would not have a namespace."""
+    """Raise FieldError if ROS does not allow a namespace."""
     full = namespace if namespace.startswith("/") else f"/{namespace}"
     try:
         validate_namespace(full)
@@ -132,6 +125,4 @@ def linger(executor: Executor, node: Any, interrupt: Interrupt) -> None:
 
 def acknowledged(publisher: Any) -> bool:
     """Whether all messages of a publisher have arrived."""
-    from rclpy.duration import Duration
-
     return bool(publisher.wait_for_all_acked(Duration(seconds=0.05)))

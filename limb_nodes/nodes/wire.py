@@ -15,6 +15,7 @@ from rclpy.serialization import serialize_message
 
 from limb_nodes.bags.columns import MessageLayout
 from limb_nodes.bags.types import limb_typestore
+from limb_nodes.nodes.identity import FRAME, LENGTH, TEXT
 from limb_nodes.nodes.ticks import SECOND
 
 STAMP, STAMP_AT = struct.Struct("<iI"), 4
@@ -33,7 +34,8 @@ def type_name(kind: type) -> str:
 
 
 def example_in_bytes(example: Any) -> tuple[bytes, MessageLayout]:
-    """A message as bytes, and where its fields are in them."""
+    """A message as bytes with room for the identity of a run, and where its fields are in them."""
+    example.header.frame_id = "0" * LENGTH
     data = serialize_message(example)
     layout = MessageLayout(data, limb_typestore())
     layout.message(type_name(type(example)), "")
@@ -44,7 +46,8 @@ def example_in_bytes(example: Any) -> tuple[bytes, MessageLayout]:
 class Outgoing:
     """Messages of one publisher.
 
-    values: by field name, an array of the message's numbers that is written to.
+    values: by field name, an array of the message's numbers that is written to. The messages carry the identity that
+    `identify` was told last.
     """
 
     def __init__(self, publisher: Any, example: Any, nanoseconds: int) -> None:
@@ -61,6 +64,10 @@ class Outgoing:
             for name, (start, dtype, shape) in layout.numbers.items()
         }
         self._tick = self.values.get("tick")
+
+    def identify(self, frame: bytes) -> None:
+        """Let the messages carry the identity of a run; frame: as `frame_of` gives it."""
+        self._data[FRAME] = frame
 
     def publish(self, tick: int) -> None:
         """Send the numbers as those of a tick."""
@@ -113,7 +120,9 @@ class Incoming:
     def _use(self, data: bytes, layout: MessageLayout) -> None:
         """Take messages to be like this one."""
         self._size = len(data)
-        self._constant = [(a, b, data[a:b]) for a, b in joined(layout.constant)]
+        # Who receives a message has looked at its identity.
+        constant = [(a, b) for a, b in layout.constant if (a, b) != (TEXT.start, TEXT.stop)]
+        self._constant = [(a, b, data[a:b]) for a, b in joined(constant)]
         self._numbers = {
             name: (start, dtype, int(np.prod(shape, dtype=np.int64)))
             for name, (start, dtype, shape) in layout.numbers.items()
@@ -123,10 +132,10 @@ class Incoming:
 
 def joined(ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Ranges with those that touch made one."""
-    found: list[tuple[int, int]] = []
+    result: list[tuple[int, int]] = []
     for start, end in ranges:
-        if found and found[-1][1] == start:
-            found[-1] = found[-1][0], end
+        if result and result[-1][1] == start:
+            result[-1] = result[-1][0], end
         elif end > start:
-            found.append((start, end))
-    return found
+            result.append((start, end))
+    return result

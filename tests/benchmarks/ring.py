@@ -77,7 +77,8 @@ def spin(ring: Ring, names: Sequence[str]) -> Spent:
     from rclpy.context import Context
     from rclpy.signals import SignalHandlerOptions
 
-    from limb_nodes.nodes.running import linger, make_executor
+    from limb_nodes.nodes.distribution import make_executor
+    from limb_nodes.nodes.running import linger
 
     make: Callable[[Ring, str, Any], Any] = bare_node if ring.kind == "bare" else product_node
     context = Context()
@@ -148,11 +149,12 @@ def in_three_processes(ring: Ring) -> Spent:
 
 def recorded(ring: Ring) -> Spent:
     """Seconds per tick of the product's graph with its recorder and all topics of every tick."""
-    from limb_nodes.nodes.session import Run, checked, run_in_one_process
+    from limb_nodes.nodes.session import run_in_one_process
+    from limb_nodes.nodes.settings import RunSettings, checked
 
     with tempfile.TemporaryDirectory() as folder:
-        run = Run(limb=ring.limb, source=waves(ring), rate=1000.0, duration=ring.ticks / 1000.0, out=f"{folder}/bag")
-        ready, _ = checked(run)
+        seconds = ring.ticks / 1000.0
+        ready, _ = checked(RunSettings(ring.limb, waves(ring), rate=1000.0, duration=seconds, out=f"{folder}/bag"))
         cpu = time.process_time()
         outcome = run_in_one_process(ready, lambda tick: None)
         cpu = time.process_time() - cpu

@@ -187,7 +187,7 @@ class Bench:
         from rclpy.context import Context
         from rclpy.signals import SignalHandlerOptions
 
-        from limb_nodes.nodes.running import make_executor
+        from limb_nodes.nodes.distribution import make_executor
 
         self.namespace = namespace
         self.context = Context()
@@ -329,10 +329,11 @@ def bags() -> type[Bags]:
 @pytest.fixture(scope="session")
 def reference(limb: str, waves: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A lockstep run in this process: 0.5 s at 1 kHz."""
-    from limb_nodes.nodes.session import Run, checked, run_in_one_process
+    from limb_nodes.nodes.session import run_in_one_process
+    from limb_nodes.nodes.settings import RunSettings, checked
 
     out = tmp_path_factory.mktemp("reference") / "run"
-    ready, _ = checked(Run(limb=limb, source=waves, rate=1000.0, duration=0.5, out=str(out)))
+    ready, _ = checked(RunSettings(limb=limb, source=waves, rate=1000.0, duration=0.5, out=str(out)))
     with undisturbed():
         outcome = run_in_one_process(ready, lambda tick: None)
     assert (outcome.ticks, outcome.missing, outcome.bad_input, outcome.interrupted) == (501, 0, 0, False)

@@ -144,21 +144,3 @@ def test_a_killed_recorder_leaves_what_can_be_recovered(recorded, bags, tmp_path
     assert whole(tmp_path / "recovered", bags) > 100
     with BagReader(tmp_path / "recovered") as bag:
         assert bag.run_info()["parameters"]["recorder"]["out"] == str(out)
-
-
-def test_a_second_run_in_the_same_namespace_is_refused(limb, processes, until, tmp_path):
-    """Its nodes would take the first run's messages for their own, and the other way round."""
-    arguments = ["run", limb, "--activation", "flexor=0.9,extensor=0"]
-    # At a rate that leaves the machine to the others.
-    slowly = ["--mode", "realtime", "--rate", "50", "--duration", LONG]
-    first = processes.limb(*arguments, *slowly, "--out", tmp_path / "first")
-    until(lambda: bytes_in(tmp_path / "first") or not first.running(), "the first run")
-    second = processes.limb(*arguments, "--duration", "1", "--out", tmp_path / "second")
-    third = processes.limb(*arguments, "--duration", "0.1", "--out", tmp_path / "third", "--namespace", "other")
-    assert second.wait() == 2
-    assert len(second.said.splitlines()) == 1
-    assert "--namespace" in second.said
-    # On a busy machine it may hear of the first only when its own nodes are there.
-    assert "runs already in namespace /" not in second.said or not (tmp_path / "second").exists()
-    assert (third.wait(), third.said) == (0, "")
-    assert first.running()

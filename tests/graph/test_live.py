@@ -17,6 +17,7 @@ from std_msgs.msg import Header
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.nodes.activation_input import ActivationInput
+from limb_nodes.nodes.identity import new_identity
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
 from limb_nodes.nodes.muscle_stack import MuscleStack
 from limb_nodes.nodes.qos import LIVE, STREAM
@@ -26,6 +27,8 @@ from limb_nodes.nodes.ticks import Ticks
 NAN, INF = float("nan"), float("inf")
 RATE = 200.0
 TICKS = Ticks(RATE)
+# The identity of the run that the hand-made messages belong to.
+RUN = new_identity()
 MUSCLES, JOINTS = ["flexor", "extensor"], ["joint"]
 
 BAD_ACTIVATIONS = {
@@ -59,19 +62,23 @@ BAD_TORQUES = {
 }
 
 
+def header(tick: int) -> Header:
+    return Header(stamp=TICKS.stamp(tick), frame_id=RUN)
+
+
 def activation(tick: int, **fields: Any) -> MuscleActivation:
     given = {"name": MUSCLES, "activation": [0.5, 0.5], **fields}
-    return MuscleActivation(header=Header(stamp=TICKS.stamp(tick)), tick=tick, **given)
+    return MuscleActivation(header=header(tick), tick=tick, **given)
 
 
 def states(tick: int, **fields: Any) -> JointState:
     given = {"name": JOINTS, "position": [0.5], "velocity": [0.0], **fields}
-    return JointState(header=Header(stamp=TICKS.stamp(tick)), **given)
+    return JointState(header=header(tick), **given)
 
 
 def torque(tick: int, **fields: Any) -> JointTorque:
     zeros = {key: [0.0] for key in ("torque", "slope_angle", "slope_velocity", "slope_time")}
-    return JointTorque(header=Header(stamp=TICKS.stamp(tick)), tick=tick, **{"joint": JOINTS, **zeros, **fields})
+    return JointTorque(header=header(tick), tick=tick, **{"joint": JOINTS, **zeros, **fields})
 
 
 def warnings(said: str, node: str) -> list[str]:
@@ -147,7 +154,7 @@ def test_muscle_stack_waits_for_good_joint_states(bench, limb, capfd):
 def test_limb_dynamics_keeps_bad_torques_out(mode, bench, limb, capfd):
     graph = bench()
     heard = graph.listen(JointState, "joint_states", STREAM)
-    node = graph.add(LimbDynamics, limb=limb, rate=RATE, mode=mode)
+    node = graph.add(LimbDynamics, limb=limb, rate=RATE, mode=mode, identity=RUN)
     torques = graph.publisher(JointTorque, "joint_torque", STREAM)
     graph.until(lambda: heard, "joint states 0")
     for count, fields in enumerate(BAD_TORQUES.values(), 1):

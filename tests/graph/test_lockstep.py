@@ -11,7 +11,8 @@ import pytest
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.model import load_limb
-from limb_nodes.nodes.session import CLASSES, Run, checked, run_in_one_process, run_in_processes
+from limb_nodes.nodes.session import CLASSES, run_in_one_process, run_in_processes
+from limb_nodes.nodes.settings import RunSettings, checked
 from limb_nodes.signals.activation import load_activation
 from limb_nodes.solve.stepping import LimbStepper, MuscleStepper
 from limb_nodes.solve.whole import WholeModel
@@ -45,13 +46,13 @@ def test_the_bag_suffices_to_run_again(reference, limb, bags, tmp_path, own_sign
     again = tmp_path / "limb.yaml"
     again.write_text(info["limb"])
     own = info["parameters"]["activation_input"]
-    run, _ = checked(Run(str(again), own["source"], own["rate"], own["duration"], str(tmp_path / "again")))
+    run, _ = checked(RunSettings(str(again), own["source"], own["rate"], own["duration"], str(tmp_path / "again")))
     run_in_one_process(run, lambda tick: None)
     assert bags.differences(reference, tmp_path / "again") == []
 
 
 def test_four_processes_give_the_same_values(reference, limb, waves, bags, tmp_path, own_signals):
-    run, _ = checked(Run(limb, waves, RATE, 0.5, str(tmp_path / "run")))
+    run, _ = checked(RunSettings(limb, waves, RATE, 0.5, str(tmp_path / "run")))
     seen: list[int] = []
     outcome = run_in_processes(run, seen.append)
     assert (outcome.ticks, outcome.missing, outcome.bad_input) == (TICKS, 0, 0)
@@ -200,7 +201,7 @@ def test_the_graph_equals_the_steppers(reference, limb, waves, bags):
 @pytest.mark.parametrize("name", ["reference_joint", "reference_joint_tendon"])
 def test_the_graph_follows_the_whole_model(name, limb, waves, bags, tmp_path, own_signals):
     file = str(Path(limb).with_name(f"{name}.yaml"))
-    run, _ = checked(Run(file, waves, RATE, 2.0, str(tmp_path / "run"), states=()))
+    run, _ = checked(RunSettings(file, waves, RATE, 2.0, str(tmp_path / "run"), states=()))
     assert run_in_one_process(run, lambda tick: None).missing == 0
     model = load_limb(file)
     movement = WholeModel(model).simulate(load_activation(waves, model.muscle_names, RATE, 2.0).values, RATE)
@@ -209,7 +210,9 @@ def test_the_graph_follows_the_whole_model(name, limb, waves, bags, tmp_path, ow
 
 
 def test_states_every_few_ticks_or_not_at_all(reference, limb, waves, bags, tmp_path, own_signals):
-    run, _ = checked(Run(limb, waves, RATE, 0.2, str(tmp_path / "few"), states=("muscle_state",), state_every=50))
+    run, _ = checked(
+        RunSettings(limb, waves, RATE, 0.2, str(tmp_path / "few"), states=("muscle_state",), state_every=50)
+    )
     outcome = run_in_one_process(run, lambda tick: None)
     assert (outcome.ticks, outcome.missing) == (201, 0)
     full = bags.decoded(reference)
@@ -223,7 +226,7 @@ def test_states_every_few_ticks_or_not_at_all(reference, limb, waves, bags, tmp_
 @pytest.mark.parametrize(("every", "ticks"), [(1000, 4), (1, 2)])
 def test_the_shortest_runs_are_complete(every, ticks, limb, waves, bags, tmp_path, own_signals):
     """Shorter than one interval of states, and one tick long."""
-    run, _ = checked(Run(limb, waves, RATE, (ticks - 1) / RATE, str(tmp_path / "run"), state_every=every))
+    run, _ = checked(RunSettings(limb, waves, RATE, (ticks - 1) / RATE, str(tmp_path / "run"), state_every=every))
     outcome = run_in_one_process(run, lambda tick: None)
     assert (outcome.ticks, outcome.missing) == (ticks, 0)
     found = bags.decoded(tmp_path / "run")
@@ -232,6 +235,6 @@ def test_the_shortest_runs_are_complete(every, ticks, limb, waves, bags, tmp_pat
 
 
 def test_a_run_of_one_tick_in_processes(limb, waves, bags, tmp_path, own_signals):
-    run, _ = checked(Run(limb, waves, RATE, 1 / RATE, str(tmp_path / "run")))
+    run, _ = checked(RunSettings(limb, waves, RATE, 1 / RATE, str(tmp_path / "run")))
     assert run_in_processes(run, lambda tick: None).ticks == 2
     bags.complete(tmp_path / "run", 2, PERIOD_NS)

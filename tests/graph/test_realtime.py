@@ -22,7 +22,8 @@ from limb_nodes.nodes.muscle_stack import MuscleStack
 from limb_nodes.nodes.qos import EVERY, LIVE, STREAM
 from limb_nodes.nodes.recorder import Recorder
 from limb_nodes.nodes.running import close
-from limb_nodes.nodes.session import Run, checked, run_in_one_process
+from limb_nodes.nodes.session import run_in_one_process
+from limb_nodes.nodes.settings import RunSettings, checked
 
 RATE, PERIOD_NS = 200.0, 5_000_000
 TOPICS = ("activation", "joint_states")
@@ -36,7 +37,7 @@ def lockstep(limb, waves, tmp_path, own_signals):
 
     def make(source: str = waves, seconds: float = 2.0, file: str = limb, rate: float = RATE) -> Path:
         out = tmp_path / "lockstep"
-        run, _ = checked(Run(file, source, rate, seconds, str(out)))
+        run, _ = checked(RunSettings(file, source, rate, seconds, str(out)))
         assert run_in_one_process(run, lambda tick: None).missing == 0
         return out
 
@@ -44,7 +45,7 @@ def lockstep(limb, waves, tmp_path, own_signals):
 
 
 def test_real_time_follows_the_lockstep_run(limb, waves, lockstep, bags, tmp_path, own_signals):
-    run, _ = checked(Run(limb, waves, RATE, 2.0, str(tmp_path / "run"), mode="realtime"))
+    run, _ = checked(RunSettings(limb, waves, RATE, 2.0, str(tmp_path / "run"), mode="realtime"))
     outcome = run_in_one_process(run, lambda tick: None)
     assert (outcome.missing, outcome.bad_input) == (0, 0)
     # The last tick is due 2 s after the first; a machine that is busy may be later, never earlier.

@@ -127,6 +127,8 @@ GOOD = {
         ({"limb": "5"}, ["limb", "5"]),
         ({"mode": "slow"}, ["mode", "slow", "lockstep, realtime"]),
         ({"mode": "true"}, ["mode", "True"]),
+        ({"identity": "mine"}, ["identity", "mine", "32 hexadecimal digits"]),
+        ({"identity": "7"}, ["identity", "7"]),
         ({"rate": "0.0"}, ["rate", "0"]),
         ({"rate": "-1.0"}, ["rate", "-1"]),
         ({"rate": ".nan"}, ["rate", "nan"]),

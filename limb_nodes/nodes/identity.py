@@ -1,0 +1,57 @@
+"""The identity of a run: its nodes agree on it before tick 0, and every message of the run carries it.
+
+It stands in `header.frame_id`, the one field that all these messages share; joint angles and torques have no frame.
+What carries another identity belongs to another run. On the topic `run_identity` limb_dynamics claims the namespace for
+its run, with the time of the claim; of two runs that claim the same namespace the later one gives way.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import time
+import uuid
+
+from builtin_interfaces.msg import Time
+from std_msgs.msg import Header
+
+from limb_nodes.nodes.ticks import SECOND
+
+LENGTH = 32
+FORM = f"{LENGTH} hexadecimal digits"
+# Where a serialised message that begins with a header holds the length of its frame_id, the text and the zero after it.
+FRAME = slice(12, 12 + 4 + LENGTH + 1)
+TEXT = slice(FRAME.start + 4, FRAME.stop)
+
+
+def new_identity() -> str:
+    """An identity that no other run has."""
+    return uuid.uuid4().hex
+
+
+def is_identity(text: str) -> bool:
+    """Whether a text has the form of an identity."""
+    return re.fullmatch(f"[0-9a-f]{{{LENGTH}}}", text) is not None
+
+
+def frame_of(identity: str) -> bytes:
+    """The frame_id of a run's messages, as bytes of the message: length, text, zero."""
+    return struct.pack("<I", LENGTH + 1) + identity.encode() + b"\0"
+
+
+def identity_of(frame: bytes) -> str:
+    """The identity in such bytes; empty if they hold none."""
+    text = frame[4:-1].decode("ascii", "replace")
+    return text if is_identity(text) and frame == frame_of(text) else ""
+
+
+def new_claim(identity: str) -> Header:
+    """A claim of the namespace, made now."""
+    sec, nanosec = divmod(time.time_ns(), SECOND)
+    return Header(frame_id=identity, stamp=Time(sec=sec, nanosec=nanosec))
+
+
+def comes_before(one: Header, other: Header) -> bool:
+    """Whether the first of two claims was made before the second; both runs come to the same answer."""
+    first, second = ((claim.stamp.sec, claim.stamp.nanosec, claim.frame_id) for claim in (one, other))
+    return first < second

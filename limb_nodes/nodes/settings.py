@@ -1,0 +1,124 @@
+"""What to run, checked before anything is written, and how a run went."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from limb_nodes.bags.folder import refuse_existing
+from limb_nodes.bags.read import BagReader
+from limb_nodes.errors import FieldError
+from limb_nodes.model import load_limb
+from limb_nodes.nodes.base import NODES, STATES
+from limb_nodes.nodes.identity import new_identity
+from limb_nodes.nodes.running import check_namespace
+from limb_nodes.nodes.ticks import Ticks
+from limb_nodes.signals.activation import load_activation
+
+# Longest run (s).
+LONGEST = 1e9
+
+Progress = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """What to run. limb: YAML file. source: of activations, empty for live input. rate: Hz.
+
+    duration: s, 0 for the whole source. out: folder of the bag. namespace: of all nodes. states: topics of states to
+    record, every `state_every` ticks. command: that started the run, for the record. identity: of the run.
+    """
+
+    limb: str
+    source: str
+    rate: float
+    duration: float
+    out: str
+    mode: str = "lockstep"
+    namespace: str = ""
+    states: tuple[str, ...] = STATES
+    state_every: int = 1
+    command: str = ""
+    identity: str = field(default_factory=new_identity)
+
+    def parameters(self, node: str) -> dict[str, Any]:
+        """The ROS parameters of a node."""
+        common = {"limb": self.limb, "mode": self.mode, "rate": self.rate, "identity": self.identity}
+        own: dict[str, dict[str, Any]] = {
+            "activation_input": {"source": self.source, "duration": self.duration},
+            "muscle_stack": {
+                "state_every": self.state_every,
+                **{f"publish_{topic}": topic in self.states for topic in STATES},
+            },
+            "limb_dynamics": {"await_recorder": True},
+            "recorder": {"out": self.out, "command": self.command},
+        }
+        return {**common, **own[node]}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run went. ticks: on the topic joint_states; missing: ticks not in the bag, over all topics;
+    missed: deadlines in real time; bad_input: messages that could not be used; seconds: wall time.
+    """
+
+    ticks: int
+    missing: int
+    missed: int
+    bad_input: int
+    seconds: float
+    interrupted: bool
+
+
+def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
+    """Check a run before anything is written; the settings with absolute paths, and the last tick if it has one.
+
+    Raises FieldError, or UserError for what is wrong in a file.
+    """
+    limb = load_limb(settings.limb)
+    Ticks(settings.rate)
+    check_namespace(settings.namespace)
+    refuse_existing(Path(settings.out))
+    tick = 1 / settings.rate
+    if settings.duration and not tick <= settings.duration <= LONGEST:
+        raise FieldError(
+            "duration",
+            f"is {settings.duration:g}; a number from {tick:g}, one tick, to {LONGEST:g} in s is needed",
+        )
+    final = round(settings.duration * settings.rate) if settings.duration else None
+    source = settings.source
+    if source:
+        activation = load_activation(source, limb.muscle_names, settings.rate, settings.duration or None)
+        final = len(activation.values) - 1
+        source = str(Path(source).resolve()) if Path(source).exists() else source
+    elif settings.mode == "lockstep":
+        raise FieldError("source", "is missing; in lockstep a bag, CSV, waveform YAML or constants are needed")
+    limb_file, out = str(Path(settings.limb).resolve()), str(Path(settings.out).resolve())
+    return replace(settings, limb=limb_file, out=out, source=source), final
+
+
+def recorded_outcome(settings: RunSettings, seconds: float, interrupted: bool) -> Outcome:
+    """Count what the bag of a run holds."""
+    with BagReader(settings.out) as bag:
+        ticks = bag.count("joint_states")
+        missing = 0
+        for topic in ("activation", "joint_torque", "movement_pattern", *settings.states):
+            every = settings.state_every if topic in settings.states else 1
+            missing += max(0, -(-ticks // every) - bag.count(topic))
+        missed, bad_input = reported(bag, settings.namespace)
+    return Outcome(ticks, missing, missed, bad_input, seconds, interrupted)
+
+
+def reported(bag: BagReader, namespace: str) -> tuple[int, int]:
+    """Missed deadlines and messages that could not be used, as the nodes have told on `/diagnostics`."""
+    missed, bad_input = 0, dict.fromkeys(NODES, 0)
+    names = {f"/{namespace.strip('/')}/{node}".replace("//", "/"): node for node in NODES}
+    messages = bag.read_topic("/diagnostics") if bag.has("/diagnostics") else ()
+    for status in (status for _, message in messages for status in message.status if status.name in names):
+        values = {pair.key: int(pair.value) for pair in status.values}
+        missed = max(missed, values.get("missed_deadlines", 0))
+        node = names[status.name]
+        bad_input[node] = max(bad_input[node], values.get("bad_input", 0))
+    return missed, sum(bad_input.values())
