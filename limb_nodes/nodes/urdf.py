@@ -11,7 +11,7 @@ WIDTH = 0.04
 
 
 def urdf(limb: Limb) -> str:
-    """The robot description: one link per segment, revolute about z where the joint has a range."""
+    """The robot description: one link per segment, revolute about z if the joint has a range."""
     robot = xml.Element("robot", name=limb.name)
     xml.SubElement(robot, "link", name="base")
     x, y = limb.base_position

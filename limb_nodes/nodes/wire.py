@@ -34,7 +34,7 @@ def type_name(kind: type) -> str:
 
 
 def example_in_bytes(example: Any) -> tuple[bytes, MessageLayout]:
-    """A message as bytes with room for the identity of a run, and where its fields are in them."""
+    """A message as bytes with room for the identity of a run, and the places of its fields."""
     example.header.frame_id = "0" * LENGTH
     data = serialize_message(example)
     layout = MessageLayout(data, limb_typestore())
@@ -109,7 +109,7 @@ class Incoming:
         return np.frombuffer(self._data, dtype=dtype, count=count, offset=start)
 
     def _learn(self, data: bytes) -> None:
-        """Find where everything is in messages of this size with these names."""
+        """Learn the place of every field in messages of this size with these names."""
         layout = MessageLayout(data, limb_typestore())
         try:
             layout.message(self._kind, "")
