@@ -272,11 +272,12 @@ def started_nodes() -> Iterator[list[Any]]:
 
 def topic_table(nodes: Sequence[Any]) -> str:
     """Topics by name: type, who publishes, who subscribes, quality of service."""
+    from limb_nodes.nodes.distribution import subscriptions_of
+
     topics: dict[str, dict[str, Any]] = {}
     for role in ("from", "to"):
         for node in nodes:
-            # Those that the recorder polls are not among its `subscriptions`.
-            for end in node.publishers if role == "from" else node._subscriptions:
+            for end in node.publishers if role == "from" else subscriptions_of(node):
                 topic = end.topic_name if end.topic_name.startswith("/diagnostics") else end.topic_name.lstrip("/")
                 if topic in ("rosout", "parameter_events", "clock"):
                     continue
@@ -300,8 +301,10 @@ def quality(profile: Any) -> str:
 
 def node_section(node: Any) -> str:
     """The parameters of a node with what it declares about them."""
+    from limb_nodes.nodes.distribution import parameter_values
+
     rows = []
-    for name in node._parameters:
+    for name in parameter_values(node):
         if name.startswith(("qos_overrides", "start_type_description_service", "use_sim_time")):
             continue
         about = node.describe_parameter(name)

@@ -36,3 +36,8 @@ def given_parameters(node: Node) -> dict[str, Parameter]:
 def parameter_values(node: Node) -> dict[str, Any]:
     """The values of all parameters that a node has declared, by name."""
     return {name: parameter.value for name, parameter in node._parameters.items()}
+
+
+def subscriptions_of(node: Node) -> list[Subscription]:
+    """All subscriptions of a node, those that no executor takes messages of included."""
+    return list(node._subscriptions)

@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-DOMAINS = 101
-
 ROOT = Path(__file__).resolve().parents[2]
 # Children run the checkout's package, as this process does, whatever is installed and wherever they start.
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
@@ -123,34 +121,9 @@ class Processes:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _own_domain(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """A ROS domain that nobody on this machine uses, so that no other nodes are heard and none hear these."""
+def _own_logs(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """A folder for the logs of ROS; the domain is the one that this process has reserved."""
     os.environ["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("ros"))
-    for step in range(DOMAINS):
-        domain = (os.getpid() + step) % DOMAINS + 1
-        if not inhabited(domain):
-            os.environ["ROS_DOMAIN_ID"] = str(domain)
-            return
-    pytest.fail(f"all ROS domains from 1 to {DOMAINS} are in use")
-
-
-def inhabited(domain: int) -> bool:
-    """Whether nodes show up in a domain within the time that discovery takes on one machine."""
-    import rclpy
-    from rclpy.context import Context
-    from rclpy.signals import SignalHandlerOptions
-
-    context = Context()
-    rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-    probe = rclpy.create_node("probe", context=context)
-    try:
-        wait_until(lambda: probe.get_node_names() != ["probe"], "other nodes", deadline=0.7)
-    except AssertionError:
-        return False
-    finally:
-        probe.destroy_node()
-        rclpy.shutdown(context=context)
-    return True
 
 
 @pytest.fixture
