@@ -17,7 +17,7 @@ def is_finite(value: float) -> bool:
 class Parameter:
     """A number that the user gives: name, unit, meaning, allowed range, default and its source.
 
-    default: a float, the name of another parameter of the same owner, or None where it must be
+    default: a float, the name of another parameter of the same owner, or None if it must be
         given.
     above, below: strict bounds; minimum, maximum: bounds that are themselves allowed.
     """

@@ -15,7 +15,7 @@ from limb_nodes.foundation.parameter import Parameter, is_finite
 
 
 def read_yaml(path: Path) -> tuple[Any, str]:
-    """Content and text of a YAML 1.2 file; UserError where it cannot be read."""
+    """Content and text of a YAML 1.2 file; UserError if it cannot be read."""
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -85,7 +85,7 @@ class Section:
         return self.content.get(key) is not None
 
     def take(self, key: str) -> Any:
-        """The raw value of a key, None where it is missing."""
+        """The raw value of a key, None if it is missing."""
         self._taken.add(key)
         return self.content.get(key)
 
@@ -112,7 +112,7 @@ class Section:
         return str(value)
 
     def number(self, parameter: Parameter, key: str | None = None) -> float | None:
-        """The value of a parameter, its numeric default, or None where it refers to another."""
+        """The value of a parameter, its numeric default, or None if it refers to another."""
         key = key or parameter.name
         value = self.take(key)
         if value is None:

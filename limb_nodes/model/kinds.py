@@ -86,7 +86,7 @@ class UnitKind:
 class MuscleKind:
     """Muscles with the same laws. Stages as in `UnitKind`; `loop` needs the total fibre force.
 
-    groups: the kinds of its groups of units, by index and in order; none where they are too many to be
+    groups: the kinds of its groups of units, by index and in order; none if they are too many to be
         written out one by one.
     """
 

@@ -273,7 +273,7 @@ class UnitGroup:
 
 
 def find_or_add(kinds: list[Kind], new: Kind, key: Callable[[Kind], object]) -> tuple[int, Kind]:
-    """The kind with the same laws, added where there is none yet."""
+    """The kind with the same laws, added if there is none yet."""
     for index, kind in enumerate(kinds):
         if key(kind) == key(new):
             return index, kind

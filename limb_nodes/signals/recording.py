@@ -24,7 +24,7 @@ class Recording:
 
     source: the file or bag, as the user named it.
     names, units: one per channel; the unit is "" if the recording does not state one.
-    values: [samples, channels], in the channels' units; NaN where a value is missing. Samples at
+    values: [samples, channels], in the channels' units; NaN if a value is missing. Samples at
         the end that miss every channel are left out.
     rate: samples per second (Hz).
     notes: what a person should know about this recording, one sentence each.

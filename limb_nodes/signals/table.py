@@ -25,8 +25,8 @@ class TextTable:
     source: the file, as the user named it.
     header: what stands above the numbers.
     names, units: one per column but that of times; the unit is "" if the file does not state one.
-    values: [rows, columns], in the columns' units; NaN where a cell is empty.
-    times: [rows], s, NaN where a cell is empty; None if no column holds times.
+    values: [rows, columns], in the columns' units; NaN if a cell is empty.
+    times: [rows], s, NaN if a cell is empty; None if no column holds times.
     lines: [rows], the line of the file that each row ends on, counted from 1.
     """
 
