@@ -9,9 +9,11 @@ from pathlib import Path
 from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.errors import FieldError
 from limb_nodes.foundation.text_table import aligned
+from limb_nodes.signals.clock import GAPS, ClockOptions
 from limb_nodes.signals.emg import EnvelopeOptions, Envelopes, envelopes, write_envelopes
 from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
 from limb_nodes.signals.recording import RAW_TOPIC, read_recording
+from limb_nodes.signals.text_options import DECIMALS, TextOptions
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -22,20 +24,29 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Band-pass, rectify, low-pass and normalise raw EMG; write the envelopes (topic emg_envelope) and "
         "the angles recorded beside them (topic reference_angle) to a bag.",
     )
-    parser.add_argument("file", help="tab- or comma-separated text with named columns, or a bag")
+    parser.add_argument("file", help="text with named columns, such as CSV, or a bag")
     parser.add_argument("-o", "--out", required=True, metavar="BAG", help="folder to write; must not exist")
     reading = parser.add_argument_group("what is read")
-    reading.add_argument("--rate", type=float, metavar="HZ", help="samples per second, if the file does not say")
+    reading.add_argument(
+        "--rate",
+        type=float,
+        metavar="HZ",
+        help="samples per second, whatever the file says (default: as its times say)",
+    )
     reading.add_argument("--topic", default=RAW_TOPIC, help=f"topic of the raw EMG in a bag (default {RAW_TOPIC})")
     reading.add_argument(
-        "--channel", dest="channels", action="append", default=[], metavar="COLUMN[=NAME]",
+        "--channels", "--channel", dest="channels", action="append", default=[], metavar="COLUMN[=NAME]",
         help="take this EMG column, under another name if given; repeatable (default: all in V, mV, uV or no unit)",
     )  # fmt: skip
     reading.add_argument(
         "--angle", dest="angles", action="append", default=[], metavar="COLUMN[=NAME]",
         help="keep this column of angles, under another name if given; repeatable (default: all in deg or rad)",
     )  # fmt: skip
-    reading.add_argument("--skip", action="append", default=[], metavar="COLUMN", help="leave out; repeatable")
+    reading.add_argument(
+        "--skip", action="append", default=[], metavar="COLUMN",
+        help="leave out before its cells are read; repeatable",
+    )  # fmt: skip
+    add_text_options(parser)
     steps = parser.add_argument_group("steps")
     band = steps.add_mutually_exclusive_group()
     band.add_argument(
@@ -68,9 +79,66 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     steps.add_argument("--resample", type=float, metavar="HZ", help="rate of the bag (default: the recording's)")
 
 
+def add_text_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that overrule what is concluded from a text file."""
+    text = parser.add_argument_group("how a text file is read")
+    text.add_argument(
+        "--delimiter",
+        metavar="SIGN",
+        help="between columns: comma, semicolon, tab or blanks (default: as the rows show)",
+    )
+    text.add_argument("--decimal", choices=DECIMALS, help="decimal mark (default: as the rows show)")
+    text.add_argument(
+        "--header-row", type=int, metavar="LINE",
+        help="line of the columns' names, from 1; 0: there is none, they are named 'column 1' and so on",
+    )  # fmt: skip
+    text.add_argument("--encoding", metavar="NAME", help="such as utf-8 or cp1252 (default: as the first bytes show)")
+    times = text.add_mutually_exclusive_group()
+    times.add_argument("--time", metavar="COLUMN", help="column of times (default: by its name, or as it rises evenly)")
+    times.add_argument(
+        "--no-times", action="store_true", help="do not use times; the rate is that of --rate or the header"
+    )
+    text.add_argument(
+        "--unit", dest="units", action="append", default=[], metavar="[COLUMN=]UNIT",
+        help="unit of a column, or of all that state none; repeatable",
+    )  # fmt: skip
+    text.add_argument(
+        "--longest-gap", type=float, default=ClockOptions.longest_gap, metavar="S",
+        help=f"longest stretch without samples that is bridged (default {ClockOptions.longest_gap:g})",
+    )  # fmt: skip
+    text.add_argument(
+        "--gaps", choices=GAPS, default=GAPS[0], help="what becomes of a recording with longer ones (default refuse)"
+    )
+
+
+def text_options(args: argparse.Namespace, columns: Sequence[str]) -> TextOptions:
+    """What was said of the text file. columns: those that are asked for by name."""
+    pairs = [entry.rpartition("=") for entry in args.units]
+    return TextOptions(
+        encoding=args.encoding,
+        delimiter=args.delimiter,
+        decimal=args.decimal,
+        header_row=args.header_row,
+        time=args.time,
+        no_times=args.no_times,
+        units={column: unit for column, _, unit in pairs},
+        skip=tuple(args.skip),
+        wanted=tuple(columns),
+    )
+
+
 def run(args: argparse.Namespace) -> int:
     """Read, process, write, and print what was done. Raises UserError before anything is written."""
     refuse_existing(Path(args.out))
+    channels = dict(_pairs("channels", args.channels, same=True))
+    angles = dict(_pairs("angles", args.angles, same=True))
+    recording = read_recording(
+        args.file,
+        rate=args.rate,
+        topic=args.topic,
+        text=text_options(args, [*channels, *angles]),
+        clock=ClockOptions(longest_gap=args.longest_gap, gaps=args.gaps),
+    )
     options = EnvelopeOptions(
         band=None if args.no_band_pass else (args.band[0], args.band[1]),
         band_order=args.band_order,
@@ -80,11 +148,11 @@ def run(args: argparse.Namespace) -> int:
         rest=args.rest,
         resample=args.resample,
         maximum={column: _float("maximum", column, value) for column, value in _pairs("maximum", args.maximum)},
-        channels=dict(_pairs("channels", args.channels, same=True)),
-        angles=dict(_pairs("angles", args.angles, same=True)),
-        skip=tuple(args.skip),
+        channels=channels,
+        angles=angles,
+        skip=tuple(name for name in args.skip if name not in recording.skipped),
     )
-    result = envelopes(read_recording(args.file, rate=args.rate, topic=args.topic), options)
+    result = envelopes(recording, options)
     write_envelopes(result, args.out, options)
     print(summary(result, args.out))
     return 0

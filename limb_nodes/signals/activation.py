@@ -14,6 +14,7 @@ from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.signals.named_values import is_bag, read_named_values
 from limb_nodes.signals.table import check_times, is_value, read_table
+from limb_nodes.signals.text_options import TextOptions
 from limb_nodes.signals.waveform import Waveform, parse_constants, read_waveforms, sample_waveforms
 
 # A recorded run holds what drove its muscles on the first topic, a recording of EMG on the second.
@@ -57,16 +58,18 @@ class _Samples:
     notes: tuple[str, ...] = ()
 
 
-def load_activation(source: str, muscles: Sequence[str], rate: float, duration: float | None = None) -> Activation:
+def load_activation(
+    source: str, muscles: Sequence[str], rate: float, duration: float | None = None, text: TextOptions | None = None
+) -> Activation:
     """Load activations for some muscles, at k / rate for k = 0 ... duration * rate.
 
-    source: a bag with the topic `activation` or `emg_envelope`; a tab- or comma-separated file with a column
-    of times (s) and one per muscle; a waveform YAML (`limb_nodes.signals.waveform`); or constants in a line,
-    `flexor=0.9,extensor=0`. Recordings are taken along straight lines between their samples, from
+    source: a bag with the topic `activation` or `emg_envelope`; a text table (`limb_nodes.signals.table`), such as CSV
+    or OpenSim's `.mot`, with a column of times and one per muscle; a waveform YAML (`limb_nodes.signals.waveform`); or
+    constants in a line, `flexor=0.9,extensor=0`. Recordings are taken along straight lines between their samples, from
     their first sample on. Muscles of the source that are not asked for are left out, and noted.
 
     muscles: their names, in the order of the columns. rate: ticks per second (Hz). duration: seconds, a whole
-    number of ticks; None takes the whole recording.
+    number of ticks; None takes the whole recording. text: how a text table is to be read.
 
     Raises UserError if the source lacks a muscle, leaves [0, 1], misses a value or is too short; FieldError if the
     source cannot be read, or if rate or duration are impossible.
@@ -86,7 +89,7 @@ def load_activation(source: str, muscles: Sequence[str], rate: float, duration: 
         return _from_waveforms(source, parse_constants(source), muscles, rate, duration)
     if Path(source).suffix.lower() in {".yaml", ".yml"}:
         return _from_waveforms(source, read_waveforms(source), muscles, rate, duration)
-    return _from_samples(_csv(source), muscles, rate, duration)
+    return _from_samples(_table(source, muscles, text), muscles, rate, duration)
 
 
 def _ticks(duration: float, rate: float) -> int:
@@ -161,11 +164,14 @@ def _unused(names: Sequence[str], muscles: Sequence[str]) -> tuple[str, ...]:
     return (f"not used, for the limb has no such muscle: {', '.join(unused)}",) if unused else ()
 
 
-def _csv(source: str) -> _Samples:
-    table = read_table(source)
+def _table(source: str, muscles: Sequence[str], text: TextOptions | None) -> _Samples:
+    table = read_table(source, text)
+    twice = next((muscle for muscle in muscles if muscle in table.repeated), None)
+    if twice is not None:
+        raise UserError(f"{source}: two columns are named {twice!r}, a muscle of the limb; one column for it is needed")
     times = table.needed_times()
-    notes = () if times[0] == 0 else (f"its times start at {times[0]:g} s; counted from there",)
-    return _Samples(source, times, table.names, table.values, table.place, notes)
+    notes = () if times[0] == 0 else (f"its times start at {times[0]:.12g} s; counted from there",)
+    return _Samples(source, times, table.names, table.values, table.place, table.notes + notes)
 
 
 def _bag(source: str) -> _Samples:

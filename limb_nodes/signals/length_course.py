@@ -8,22 +8,24 @@ from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.signals import units
 from limb_nodes.signals.table import is_value, read_table
+from limb_nodes.signals.text_options import TextOptions
 
 
-def read_length_course(path: str | Path) -> tuple[FloatArray, FloatArray]:
-    """Times (s) from 0 on and lengths (m) of a tab- or comma-separated file.
+def read_length_course(path: str | Path, text: TextOptions | None = None) -> tuple[FloatArray, FloatArray]:
+    """Times (s) from 0 on and lengths (m) of a text table (`limb_nodes.signals.table`).
 
-    Its columns are named `time [s]` and `length [m]` (or `[mm]`); others are passed over.
+    Its columns are named `time [s]` and `length [m]` (or `[mm]`, `[cm]`); others are passed over. text: how the file is
+    to be read.
     Raises UserError that names file, line, column and value.
     """
-    table = read_table(path)
+    table = read_table(path, text)
     time = table.needed_times()
     column = next((index for index, name in enumerate(table.names) if name.lower() == "length"), None)
     if column is None:
-        raise UserError(f"{path}: no column 'length' in m or mm; there are {', '.join(table.header.names)}")
+        raise UserError(f"{path}: no column 'length' in m or mm; there are {', '.join(table.names)}")
     unit = table.units[column]
     if unit not in units.LENGTH:
-        raise UserError(f"{path}: the unit of length is {unit}; m or mm is needed")
+        raise UserError(f"{path}: the unit of length is {unit}; m, cm or mm is needed")
     length = table.values[:, column] * units.LENGTH[unit]
     if len(time) < 2:
         raise UserError(f"{path}: holds one row; at least 2 are needed")

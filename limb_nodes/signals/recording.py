@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
-from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.signals import units
+from limb_nodes.signals.clock import RATE, ClockOptions, Fitted, fit_clock
 from limb_nodes.signals.named_values import is_bag, read_named_values
-from limb_nodes.signals.table import TextTable, check_times, read_table
+from limb_nodes.signals.table import Clock, TextTable, read_table
+from limb_nodes.signals.text_options import TextOptions
 
 RAW_TOPIC = "emg_raw"
-RATE = Parameter("rate", "Hz", "samples per second", above=0.0, maximum=1e6)
+# Muscles are not recorded that slowly: such times are in another unit than s, or count samples.
+_SLOWEST = 10.0
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,8 @@ class Recording:
         the end that miss every channel are left out.
     rate: samples per second (Hz).
     notes: what a person should know about this recording, one sentence each.
+    start: time of the first sample (s) as the recording counts it, from 1970 on if its times do; None without times.
+    skipped: columns that were left out as asked, before they were read.
     """
 
     source: str
@@ -36,110 +41,249 @@ class Recording:
     values: FloatArray
     rate: float
     notes: tuple[str, ...] = ()
+    start: float | None = None
+    skipped: tuple[str, ...] = ()
 
     def unit(self, name: str) -> str:
         """The unit of a channel."""
         return self.units[self.names.index(name)]
 
 
-def read_recording(path: str | Path, *, rate: float | None = None, topic: str = RAW_TOPIC) -> Recording:
+def read_recording(
+    path: str | Path,
+    *,
+    rate: float | None = None,
+    topic: str = RAW_TOPIC,
+    text: TextOptions | None = None,
+    clock: ClockOptions | None = None,
+) -> Recording:
     """Read a recording from a text file or from a bag.
 
     A file is a text table (`limb_nodes.signals.table`), with or without a column of times. A bag holds its channels
-    as messages with `name` and `activation` on `topic`.
+    as messages with `name` and `activation` on `topic`. Times give an even clock (`limb_nodes.signals.clock`).
 
     rate: samples per second; if None, it follows from the times, or from the header.
+    text: how a text file is to be read. clock: how its times are to be taken.
 
-    Raises UserError if the input cannot be read, its rate is unknown or contradicts its times, or its times do not
-    rise evenly; FieldError if the rate that was given is at fault.
+    Raises UserError if the input cannot be read, its rate is unknown, or its times have no even clock; FieldError if
+    an option is at fault or could decide.
     """
+    options = clock or ClockOptions()
     if rate is not None:
-        RATE.check(rate)
+        options = replace(options, rate=rate)
+    options = options.checked()
     if is_bag(path):
-        return _from_bag(path, rate, topic)
-    return _from_table(read_table(path), rate)
+        return _from_bag(path, options, topic)
+    return _from_table(read_table(path, text), text or TextOptions(), options)
 
 
-def _from_table(table: TextTable, rate: float | None) -> Recording:
+def _from_table(table: TextTable, text: TextOptions, options: ClockOptions) -> Recording:
     if not table.names:
         raise UserError(f"{table.source}: no column beside the times; at least one channel is needed")
-    values, notes = _without_empty_end(table.source, table.values)
-    if table.times is not None:
-        times = table.times[: len(values)]
-        values, rate, missing = _on_even_times(table.source, times, values, table.place, rate)
-        notes += missing
-    elif rate is None:
-        rate = _stated_rate(table)
-    promised = table.header.rows
+    notes = list(table.notes)
+    kept = _signals(table, text.wanted, notes)
+    if not kept:
+        raise UserError(
+            f"{table.source}: no channel of EMG is left of {', '.join(table.names)}; at least one is needed"
+        )
+    chosen = [i for i in kept if table.columns[i].unit in units.VOLTAGE or not table.columns[i].unit] or kept
+    chosen = [i for i in chosen if table.names[i] in text.wanted] or chosen
+    clock, beside = _clock(table, chosen, kept)
+    values = table.values if beside == list(range(len(table.names))) else table.values[:, beside]
+    values = _without_empty_end(table.source, values, notes)
+    promised = table.layout.promised
     if promised not in (None, len(values)):
-        notes += (f"the header promises {promised} values, {len(values)} are there",)
-    return Recording(table.source, table.names, table.units, values, rate, notes)
+        notes.append(f"the header promises {promised} values, {len(values)} are there")
+    stated = _stated(table, chosen)
+    start = None
+    if clock is None:
+        rate = options.rate or _needed_rate(table, stated)
+    else:
+        fitted = fit_clock(table.source, clock.times[: len(values)], table.place, options, stated)
+        _check_unit(table, clock, fitted, options)
+        values, rate, start = fitted.even(values), fitted.rate, fitted.start
+        notes += _clock_notes(table, clock, rate, stated, options)
+        notes += fitted.notes
+        others = [i for i in kept if i not in beside]
+        values, beside = _with_slower_angles(table, fitted, values, beside, others, notes)
+    recording = Recording(
+        table.source, tuple(table.names[i] for i in beside), tuple(table.columns[i].unit for i in beside), values, rate,
+        tuple(notes), start, table.skipped,
+    )  # fmt: skip
+    gaps = _check_gaps(recording, [table.names[i] for i in chosen if i in beside], options)
+    return replace(recording, notes=recording.notes + gaps)
 
 
-def _stated_rate(table: TextTable) -> float:
-    """The one rate (Hz) that the header states."""
-    rates = table.header.rates
-    if len(rates) == 1 and rates[0] > 0.0:
-        return rates[0]
-    stated = f"states {' and '.join(f'{rate:g}' for rate in rates)}" if rates else "states no"
+def _signals(table: TextTable, wanted: Sequence[str], notes: list[str]) -> list[int]:
+    """The columns that may be EMG or angles, or that are asked for; what the others are is noted."""
+    kept, left = [], []
+    for index, column in enumerate(table.columns):
+        nameless = column.name == f"column {index + 1}" and table.layout.names_line is not None
+        kind = "a column without a name" if not column.unit and _is_nameless(table, index, nameless) else column.kind
+        if kind and column.name not in wanted:
+            left.append(f"{column.name} left out: {kind}")
+        else:
+            kept.append(index)
+    notes += left
+    return kept
+
+
+def _is_nameless(table: TextTable, index: int, nameless: bool) -> bool:
+    name = table.columns[index].name
+    return (
+        name.startswith("column ")
+        and all(column.name != name for column in table.layout.columns)
+        and (nameless or any(column.name for column in table.layout.columns))
+    )
+
+
+def _clock(table: TextTable, chosen: list[int], kept: list[int]) -> tuple[Clock | None, list[int]]:
+    """The times of the chosen columns, and all columns that share them."""
+    if not table.clocks:
+        return None, kept
+    if len(table.clocks) == 1:
+        return table.clocks[0], kept
+    clocks = [clock for clock in table.clocks if any(i in clock.columns for i in chosen)]
+    first = clocks[0]
+    for other in clocks[1:]:
+        # Both end where their stamps do; rows that only one of them has are missing in the other.
+        both = np.isfinite(first.times) & np.isfinite(other.times)
+        step = _median_step(first.times)
+        same = both.any() and np.abs(first.times[both] - other.times[both]).max() <= 0.5 * step
+        ends = np.isfinite(first.times).sum(), np.isfinite(other.times).sum()
+        if not same or abs(int(ends[0]) - int(ends[1])) > 0.01 * max(ends):
+            names = [table.names[next(i for i in clock.columns if i in chosen)] for clock in (first, other)]
+            rates = [1.0 / max(_median_step(clock.times), 1e-300) for clock in (first, other)]
+            raise FieldError(
+                "skip",
+                f"is not clear: {names[0]} has {rates[0]:.6g} Hz and {names[1]} {rates[1]:.6g} Hz; channels of one "
+                "rate are needed, the others skipped",
+                table.source,
+            )
+    shared = [i for i in kept if any(i in clock.columns for clock in clocks)]
+    longest = max(clocks, key=lambda clock: int(np.isfinite(clock.times).sum()))
+    return longest, shared
+
+
+def _median_step(times: FloatArray) -> float:
+    good = times[np.isfinite(times)]
+    return float((good[-1] - good[0]) / (len(good) - 1)) if len(good) > 1 else 0.0
+
+
+def _with_slower_angles(
+    table: TextTable, fitted: Fitted, values: FloatArray, beside: list[int], others: list[int], notes: list[str]
+) -> tuple[FloatArray, list[int]]:
+    """Angles with times of their own at the times of the EMG; what else has another clock is left out, and noted."""
+    added = []
+    ticks = fitted.start + np.arange(len(values)) / fitted.rate
+    for index in others:
+        column = table.columns[index]
+        clock = next(clock for clock in table.clocks if index in clock.columns)
+        good = np.isfinite(clock.times) & np.isfinite(table.values[:, index])
+        rate = f"{1.0 / _median_step(clock.times):.6g} Hz" if _median_step(clock.times) > 0.0 else "no rate"
+        if column.unit in units.ANGLE and good.any() and (np.diff(clock.times[good]) > 0.0).all():
+            added.append(np.interp(ticks, clock.times[good], table.values[good, index], np.nan, np.nan))
+            beside = [*beside, index]
+            notes.append(f"{column.name} taken from {rate} by straight lines")
+        else:
+            unit = f" ({column.unit})" if column.unit else ""
+            notes.append(f"{column.name}{unit} left out: it has {rate}")
+    return (np.column_stack([values, *added]) if added else values), beside
+
+
+def _stated(table: TextTable, chosen: list[int]) -> float | None:
+    """The one rate (Hz) that the header states for the chosen columns, or None."""
+    rates = {table.rates[i] for i in chosen if i in table.rates} or set(table.layout.stated)
+    return rates.pop() if len(rates) == 1 else None
+
+
+def _needed_rate(table: TextTable, stated: float | None) -> float:
+    if stated is not None:
+        return stated
+    rates = table.layout.stated
+    said = f"states {' and '.join(f'{rate:g}' for rate in rates)}" if rates else "states no"
     raise FieldError(
         "rate",
-        f"is missing: there are no times, and the header {stated} samples per second; {RATE.allowed()} is needed",
+        f"is missing: there are no times, and the header {said} samples per second; {RATE.allowed()} is needed",
         table.source,
     )
 
 
-def _from_bag(path: str | Path, rate: float | None, topic: str) -> Recording:
-    series = read_named_values(path, (topic,))
-    values, empty = _without_empty_end(f"{path}: topic {series.topic}", series.values)
-    values, rate, missing = _on_even_times(str(path), series.times[: len(values)], values, series.place, rate)
-    return Recording(str(path), series.names, ("",) * len(series.names), values, rate, empty + missing)
-
-
-def _without_empty_end(source: str | Path, values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Leave out the rows at the end that hold no value at all, and note how many."""
-    filled = np.flatnonzero(np.isfinite(values).any(axis=1))
-    if not filled.size:
-        raise UserError(f"{source}: holds no value; at least one sample is needed")
-    kept = int(filled[-1]) + 1
-    empty = len(values) - kept
-    return values[:kept], (f"rows without any value at the end, left out: {empty}",) if empty else ()
-
-
-def _on_even_times(
-    source: str, times: FloatArray, values: FloatArray, place: Callable[[int], str], rate: float | None
-) -> tuple[FloatArray, float, tuple[str, ...]]:
-    """Find the rate of evenly spaced times, and put NaN where rows between are missing.
-
-    times: [rows] in s; values: [rows, channels]; place: how an error names a row.
-    Returns values [samples, channels], the rate in Hz, and notes.
-    """
-    if len(times) < 2:
-        raise UserError(f"{source}: holds one row; at least 2 are needed for a rate")
-    check_times(source, times, place)
-    steps, duration = np.diff(times), times[-1] - times[0]
-    step = float(np.median(steps)) if rate is None else 1.0 / rate
-    ticks = np.concatenate([[0], np.cumsum(np.maximum(1, np.rint(steps / step)).astype(np.int64))])
-    measured = _plain_rate(ticks[-1] / duration, duration)
-    if rate is not None and abs(measured - rate) * duration > 1.0:
-        raise FieldError("rate", f"is {rate:g}; {measured:g} in Hz is needed, as the times say, or no rate", source)
-    rate = measured if rate is None else rate
-    late = np.abs(times - times[0] - ticks / rate) * rate
-    if late.max() > 0.5:
-        worst = int(late.argmax())
-        raise UserError(
-            f"{source}, {place(worst)}: time is {times[worst]:.9g}; times at an even distance, here {1 / rate:g} s, "
-            "are needed"
+def _check_unit(table: TextTable, clock: Clock, fitted: Fitted, options: ClockOptions) -> None:
+    """Raise FieldError if whole numbers without a unit may be seconds, milliseconds or a count."""
+    stated = next((column.unit for column in table.layout.columns if column.name == clock.name), "")
+    whole = np.array_equal(clock.times[:100], np.rint(clock.times[:100]), equal_nan=True)
+    if (
+        options.rate is None
+        and not stated
+        and clock.unit == "s"
+        and whole
+        and fitted.rate <= _SLOWEST
+        and fitted.count >= 20
+    ):
+        raise FieldError(
+            "units",
+            f"of {clock.name} is not clear: {fitted.rate:g} Hz if it is in s, {1e3 * fitted.rate:g} Hz if in ms; "
+            f"{clock.name}=s or {clock.name}=ms is needed, or a rate",
+            table.source,
         )
-    missing = int(ticks[-1]) + 1 - len(ticks)
-    if not missing:
-        return values, rate, ()
-    whole = np.full((int(ticks[-1]) + 1, values.shape[1]), np.nan)
-    whole[ticks] = values
-    return whole, rate, (f"rows missing between the first and the last time: {missing}",)
 
 
-def _plain_rate(rate: float, duration: float) -> float:
-    """Round a rate to six digits if that moves the last sample by less than 1 % of a step."""
-    plain = float(f"{rate:.6g}")
-    return plain if abs(plain - rate) * duration < 0.01 else rate
+def _clock_notes(table: TextTable, clock: Clock, rate: float, stated: float | None, options: ClockOptions) -> list[str]:
+    if options.rate is not None:
+        return []
+    if stated is not None and stated == rate:
+        return [f"rate {rate:.9g} Hz as the header states; the times of {clock.name} agree"]
+    if stated is not None:
+        return [f"rate {rate:.9g} Hz from the times of {clock.name}; the header states {stated:g} Hz"]
+    return [f"rate {rate:.9g} Hz from the times of {clock.name}"] if len(table.clocks) > 1 else []
+
+
+def _check_gaps(recording: Recording, channels: list[str], options: ClockOptions) -> tuple[str, ...]:
+    """Notes on the channels that have no value for longer than is bridged.
+
+    Raises FieldError instead, unless such gaps are to be kept.
+    """
+    notes = []
+    for name in channels:
+        missing = np.isnan(recording.values[:, recording.names.index(name)])
+        if not missing.any() or missing.all():
+            continue
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
+        lengths = edges[1::2] - edges[::2]
+        worst = int(lengths.argmax())
+        longest, begin = lengths[worst] / recording.rate, edges[2 * worst] / recording.rate
+        if lengths[worst] <= options.longest_gap * recording.rate:
+            continue
+        if options.gaps == "refuse":
+            raise FieldError(
+                "longest_gap",
+                f"is {options.longest_gap:g}; at least {longest:g} in s is needed, for {name} has no value from "
+                f"{begin:g} s on, or gaps kept, or the channel skipped",
+                recording.source,
+            )
+        notes.append(f"{name} has no value for {longest:g} s from {begin:g} s on: kept as a gap")
+    return tuple(notes)
+
+
+def _from_bag(path: str | Path, options: ClockOptions, topic: str) -> Recording:
+    series = read_named_values(path, (topic,))
+    notes: list[str] = []
+    values = _without_empty_end(f"{path}: topic {series.topic}", series.values, notes)
+    fitted = fit_clock(str(path), series.times[: len(values)], series.place, options)
+    return Recording(
+        str(path), series.names, ("",) * len(series.names), fitted.even(values), fitted.rate,
+        (*notes, *fitted.notes), fitted.start,
+    )  # fmt: skip
+
+
+def _without_empty_end(source: str | Path, values: FloatArray, notes: list[str]) -> FloatArray:
+    """Leave out the rows at the end that hold no value at all, and note how many."""
+    for kept in range(len(values), 0, -1):
+        if np.isfinite(values[kept - 1]).any():
+            break
+    else:
+        raise UserError(f"{source}: holds no value; at least one sample is needed")
+    if kept < len(values):
+        notes.append(f"rows without any value at the end, left out: {len(values) - kept}")
+    return values[:kept]
