@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from limb_nodes.bags.folder import refuse_existing
+from limb_nodes.commands.text_options import add_text_options, text_options
 from limb_nodes.errors import FieldError
 from limb_nodes.foundation.text_table import aligned
-from limb_nodes.signals.clock import GAPS, ClockOptions
 from limb_nodes.signals.emg import EnvelopeOptions, Envelopes, envelopes, write_envelopes
 from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
 from limb_nodes.signals.recording import RAW_TOPIC, read_recording
-from limb_nodes.signals.text_options import DECIMALS, TextOptions
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -35,7 +34,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     reading.add_argument("--topic", default=RAW_TOPIC, help=f"topic of the raw EMG in a bag (default {RAW_TOPIC})")
     reading.add_argument(
-        "--channels", "--channel", dest="channels", action="append", default=[], metavar="COLUMN[=NAME]",
+        "--channel", dest="channels", action="append", default=[], metavar="COLUMN[=NAME]",
         help="take this EMG column, under another name if given; repeatable (default: all in V, mV, uV or no unit)",
     )  # fmt: skip
     reading.add_argument(
@@ -79,54 +78,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     steps.add_argument("--resample", type=float, metavar="HZ", help="rate of the bag (default: the recording's)")
 
 
-def add_text_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that overrule what is concluded from a text file."""
-    text = parser.add_argument_group("how a text file is read")
-    text.add_argument(
-        "--delimiter",
-        metavar="SIGN",
-        help="between columns: comma, semicolon, tab or blanks (default: as the rows show)",
-    )
-    text.add_argument("--decimal", choices=DECIMALS, help="decimal mark (default: as the rows show)")
-    text.add_argument(
-        "--header-row", type=int, metavar="LINE",
-        help="line of the columns' names, from 1; 0: there is none, they are named 'column 1' and so on",
-    )  # fmt: skip
-    text.add_argument("--encoding", metavar="NAME", help="such as utf-8 or cp1252 (default: as the first bytes show)")
-    times = text.add_mutually_exclusive_group()
-    times.add_argument("--time", metavar="COLUMN", help="column of times (default: by its name, or as it rises evenly)")
-    times.add_argument(
-        "--no-times", action="store_true", help="do not use times; the rate is that of --rate or the header"
-    )
-    text.add_argument(
-        "--unit", dest="units", action="append", default=[], metavar="[COLUMN=]UNIT",
-        help="unit of a column, or of all that state none; repeatable",
-    )  # fmt: skip
-    text.add_argument(
-        "--longest-gap", type=float, default=ClockOptions.longest_gap, metavar="S",
-        help=f"longest stretch without samples that is bridged (default {ClockOptions.longest_gap:g})",
-    )  # fmt: skip
-    text.add_argument(
-        "--gaps", choices=GAPS, default=GAPS[0], help="what becomes of a recording with longer ones (default refuse)"
-    )
-
-
-def text_options(args: argparse.Namespace, columns: Sequence[str]) -> TextOptions:
-    """What was said of the text file. columns: those that are asked for by name."""
-    pairs = [entry.rpartition("=") for entry in args.units]
-    return TextOptions(
-        encoding=args.encoding,
-        delimiter=args.delimiter,
-        decimal=args.decimal,
-        header_row=args.header_row,
-        time=args.time,
-        no_times=args.no_times,
-        units={column: unit for column, _, unit in pairs},
-        skip=tuple(args.skip),
-        wanted=tuple(columns),
-    )
-
-
 def run(args: argparse.Namespace) -> int:
     """Read, process, write, and print what was done. Raises UserError before anything is written."""
     refuse_existing(Path(args.out))
@@ -137,7 +88,6 @@ def run(args: argparse.Namespace) -> int:
         rate=args.rate,
         topic=args.topic,
         text=text_options(args, [*channels, *angles]),
-        clock=ClockOptions(longest_gap=args.longest_gap, gaps=args.gaps),
     )
     options = EnvelopeOptions(
         band=None if args.no_band_pass else (args.band[0], args.band[1]),

@@ -7,7 +7,7 @@ to their stamps later; so row k belongs to tick k plus what is missing before it
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,6 @@ from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.parameter import Parameter
 
 RATE = Parameter("rate", "Hz", "samples per second", above=0.0, maximum=1e6)
-LONGEST_GAP = Parameter("longest_gap", "s", "longest stretch without samples that is bridged", minimum=0.0)
-GAPS = ("refuse", "keep")
 # A clock whose rate moves by more than this part is not one clock.
 _SAME_RATE = 0.005
 # Noise is told from uneven sampling in so many rows.
@@ -27,36 +25,12 @@ _PARTS = 64
 
 
 @dataclass(frozen=True)
-class ClockOptions:
-    """What a person says of the times.
-
-    rate: samples per second (Hz); counts more than any times. None: as the times say.
-    longest_gap: a longer stretch without samples (s) is not bridged. gaps: `refuse` such a recording, or `keep` the
-        stretch as one without values.
-    """
-
-    rate: float | None = None
-    longest_gap: float = 0.25
-    gaps: str = "refuse"
-
-    def checked(self) -> ClockOptions:
-        """These options. Raises FieldError if one is out of range."""
-        if self.rate is not None:
-            RATE.check(self.rate)
-        LONGEST_GAP.check(self.longest_gap)
-        if self.gaps not in GAPS:
-            raise FieldError("gaps", f"is {self.gaps!r}; one of {', '.join(GAPS)} is needed")
-        return self
-
-
-@dataclass(frozen=True)
 class Fitted:
     """A clock and the tick of each row.
 
     rate: Hz. start: s, time of tick 0 as the stamps count it. ticks: [rows], rising; None if row k is tick k.
     count: of ticks. wander: [rows], s, how far the true time of a row is from its tick; None if nowhere far.
-    noise: s, what stamps differ from the clock, as a rule. longest: s, the longest stretch without rows, and the row
-        after it.
+    noise: s, what stamps differ from the clock, as a rule.
     notes: what a person should know, one sentence each.
     """
 
@@ -66,7 +40,6 @@ class Fitted:
     count: int
     wander: FloatArray | None
     noise: float
-    longest: tuple[float, int]
     notes: tuple[str, ...] = ()
 
     def even(self, values: FloatArray) -> FloatArray:
@@ -88,46 +61,33 @@ class Fitted:
 
 
 def fit_clock(
-    source: str, times: FloatArray, place: Callable[[int], str], options: ClockOptions, stated: float | None = None
+    source: str,
+    times: FloatArray,
+    place: Callable[[int], str],
+    rate: float | None = None,
+    stated: float | None = None,
 ) -> Fitted:
     """Fit an even clock to stamps.
 
-    times: [rows], s; several rows may share one. place: how an error names a row. stated: rate (Hz) that the file
-    states.
+    times: [rows], s; several rows may share one. place: how an error names a row. rate: samples per second (Hz), which
+    counts more than any times; None takes what they say. stated: rate (Hz) that the file states.
 
-    Raises UserError that names the row if a stamp is missing, the stamps go back or the rate changes; FieldError if a
-    stretch without rows is too long, or if times and stated rate disagree.
+    Raises UserError that names the row if a stamp is missing, the stamps go back, the clock was set or the rate
+    changes; FieldError if times and stated rate disagree, or if the rate is out of range.
     """
-    options = options.checked()
-    if options.rate is None:
-        return _fit(source, times, place, options, stated)
+    if rate is None:
+        return _fit(source, times, place, stated)
+    RATE.check(rate)
     try:
-        fitted = _fit(source, times, place, options, None)
+        fitted = _fit(source, times, place, None)
     except UserError as error:
         note = f"times not used, for the rate is given: {str(error).removeprefix(source).lstrip(':, ')}"
-        return Fitted(options.rate, _first(times), None, len(times), None, 0.0, (0.0, 0), (note,))
-    if abs(fitted.rate - options.rate) * fitted.count / fitted.rate > 1.0:
-        note = f"rate {options.rate:g} Hz as given; the times say {fitted.rate:.7g} Hz"
-        return Fitted(
-            options.rate,
-            fitted.start,
-            fitted.ticks,
-            fitted.count,
-            None,
-            fitted.noise,
-            fitted.longest,
-            (*fitted.notes, note),
-        )
-    return Fitted(
-        options.rate,
-        fitted.start,
-        fitted.ticks,
-        fitted.count,
-        fitted.wander,
-        fitted.noise,
-        fitted.longest,
-        fitted.notes,
-    )
+        start = float(times[0]) if len(times) and np.isfinite(times[0]) else 0.0
+        return Fitted(rate, start, None, len(times), None, 0.0, (note,))
+    if abs(fitted.rate - rate) * fitted.count <= fitted.rate:
+        return replace(fitted, rate=rate)
+    note = f"rate {rate:g} Hz as given; the times say {fitted.rate:.7g} Hz"
+    return replace(fitted, rate=rate, wander=None, notes=(*fitted.notes, note))
 
 
 def plain_rate(rate: float, tolerance: float) -> float:
@@ -139,13 +99,7 @@ def plain_rate(rate: float, tolerance: float) -> float:
     return rate
 
 
-def _first(times: FloatArray) -> float:
-    return float(times[0]) if np.isfinite(times[0]) else 0.0
-
-
-def _fit(
-    source: str, times: FloatArray, place: Callable[[int], str], options: ClockOptions, stated: float | None
-) -> Fitted:
+def _fit(source: str, times: FloatArray, place: Callable[[int], str], stated: float | None) -> Fitted:
     if len(times) < 2:
         raise UserError(f"{source}: holds one row; at least 2 are needed for a rate")
     if not np.isfinite(times).all():
@@ -184,15 +138,6 @@ def _fit(
             raise _uneven(source, times, int(local.argmax()), slope, place)
     count = len(times) if ticks is None else int(ticks[-1]) + 1
     rate = _rate(source, 1.0 / slope, count, noise, stated)
-    worst = int(missing.argmax()) if missing.any() else 0
-    longest = (float(missing[worst]) / rate, worst + 1) if missing.any() else (0.0, 0)
-    if longest[0] > options.longest_gap and options.gaps == "refuse":
-        raise FieldError(
-            "longest_gap",
-            f"is {options.longest_gap:g}; at least {longest[0]:g} in s is needed for {place(longest[1])}, which comes "
-            "so long after the one before, or gaps kept",
-            source,
-        )
     notes = []
     if missing.any():
         notes.append(f"rows missing between the first and the last time: {int(missing.sum())}")
@@ -201,7 +146,7 @@ def _fit(
     if wander is not None:
         notes.append(f"resampled: the clock wanders by {np.ptp(wander) / slope:.2g} steps")
     start = begin if abs(offset) < 0.02 * slope else begin + offset
-    return Fitted(rate, start, ticks, count, wander, noise, longest, tuple(notes))
+    return Fitted(rate, start, ticks, count, wander, noise, tuple(notes))
 
 
 def _uneven(source: str, times: FloatArray, row: int, step: float, place: Callable[[int], str]) -> UserError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.signals import units
-from limb_nodes.signals.clock import RATE, ClockOptions, Fitted, fit_clock
+from limb_nodes.signals.clock import RATE, Fitted, fit_clock
 from limb_nodes.signals.named_values import is_bag, read_named_values
 from limb_nodes.signals.table import Clock, TextTable, read_table
 from limb_nodes.signals.text_options import TextOptions
@@ -50,34 +50,27 @@ class Recording:
 
 
 def read_recording(
-    path: str | Path,
-    *,
-    rate: float | None = None,
-    topic: str = RAW_TOPIC,
-    text: TextOptions | None = None,
-    clock: ClockOptions | None = None,
+    path: str | Path, *, rate: float | None = None, topic: str = RAW_TOPIC, text: TextOptions | None = None
 ) -> Recording:
     """Read a recording from a text file or from a bag.
 
     A file is a text table (`limb_nodes.signals.table`), with or without a column of times. A bag holds its channels
     as messages with `name` and `activation` on `topic`. Times give an even clock (`limb_nodes.signals.clock`).
 
-    rate: samples per second; if None, it follows from the times, or from the header.
-    text: how a text file is to be read. clock: how its times are to be taken.
+    rate: samples per second, whatever the times say; if None, it follows from them, or from the header.
+    text: how a text file is to be read.
 
     Raises UserError if the input cannot be read, its rate is unknown, or its times have no even clock; FieldError if
     an option is at fault or could decide.
     """
-    options = clock or ClockOptions()
     if rate is not None:
-        options = replace(options, rate=rate)
-    options = options.checked()
+        RATE.check(rate)
     if is_bag(path):
-        return _from_bag(path, options, topic)
-    return _from_table(read_table(path, text), text or TextOptions(), options)
+        return _from_bag(path, rate, topic)
+    return _from_table(read_table(path, text), text or TextOptions(), rate)
 
 
-def _from_table(table: TextTable, text: TextOptions, options: ClockOptions) -> Recording:
+def _from_table(table: TextTable, text: TextOptions, rate: float | None) -> Recording:
     if not table.names:
         raise UserError(f"{table.source}: no column beside the times; at least one channel is needed")
     notes = list(table.notes)
@@ -90,28 +83,28 @@ def _from_table(table: TextTable, text: TextOptions, options: ClockOptions) -> R
     chosen = [i for i in chosen if table.names[i] in text.wanted] or chosen
     clock, beside = _clock(table, chosen, kept)
     values = table.values if beside == list(range(len(table.names))) else table.values[:, beside]
-    values = _without_empty_end(table.source, values, notes)
+    values, empty = without_empty_end(table.source, values)
+    notes += empty
     promised = table.layout.promised
     if promised not in (None, len(values)):
         notes.append(f"the header promises {promised} values, {len(values)} are there")
     stated = _stated(table, chosen)
     start = None
     if clock is None:
-        rate = options.rate or _needed_rate(table, stated)
+        rate = _needed_rate(table, stated) if rate is None else rate
     else:
-        fitted = fit_clock(table.source, clock.times[: len(values)], table.place, options, stated)
-        _check_unit(table, clock, fitted, options)
+        fitted = fit_clock(table.source, clock.times[: len(values)], table.place, rate, stated)
+        if rate is None:
+            _check_unit(table, clock, fitted)
+            notes += _clock_notes(table, clock, fitted.rate, stated)
         values, rate, start = fitted.even(values), fitted.rate, fitted.start
-        notes += _clock_notes(table, clock, rate, stated, options)
         notes += fitted.notes
         others = [i for i in kept if i not in beside]
         values, beside = _with_slower_angles(table, fitted, values, beside, others, notes)
-    recording = Recording(
+    return Recording(
         table.source, tuple(table.names[i] for i in beside), tuple(table.columns[i].unit for i in beside), values, rate,
         tuple(notes), start, table.skipped,
     )  # fmt: skip
-    gaps = _check_gaps(recording, [table.names[i] for i in chosen if i in beside], options)
-    return replace(recording, notes=recording.notes + gaps)
 
 
 def _signals(table: TextTable, wanted: Sequence[str], notes: list[str]) -> list[int]:
@@ -209,18 +202,11 @@ def _needed_rate(table: TextTable, stated: float | None) -> float:
     )
 
 
-def _check_unit(table: TextTable, clock: Clock, fitted: Fitted, options: ClockOptions) -> None:
+def _check_unit(table: TextTable, clock: Clock, fitted: Fitted) -> None:
     """Raise FieldError if whole numbers without a unit may be seconds, milliseconds or a count."""
     stated = next((column.unit for column in table.layout.columns if column.name == clock.name), "")
     whole = np.array_equal(clock.times[:100], np.rint(clock.times[:100]), equal_nan=True)
-    if (
-        options.rate is None
-        and not stated
-        and clock.unit == "s"
-        and whole
-        and fitted.rate <= _SLOWEST
-        and fitted.count >= 20
-    ):
+    if not stated and clock.unit == "s" and whole and fitted.rate <= _SLOWEST and fitted.count >= 20:
         raise FieldError(
             "units",
             f"of {clock.name} is not clear: {fitted.rate:g} Hz if it is in s, {1e3 * fitted.rate:g} Hz if in ms; "
@@ -229,9 +215,7 @@ def _check_unit(table: TextTable, clock: Clock, fitted: Fitted, options: ClockOp
         )
 
 
-def _clock_notes(table: TextTable, clock: Clock, rate: float, stated: float | None, options: ClockOptions) -> list[str]:
-    if options.rate is not None:
-        return []
+def _clock_notes(table: TextTable, clock: Clock, rate: float, stated: float | None) -> list[str]:
     if stated is not None and stated == rate:
         return [f"rate {rate:.9g} Hz as the header states; the times of {clock.name} agree"]
     if stated is not None:
@@ -239,51 +223,21 @@ def _clock_notes(table: TextTable, clock: Clock, rate: float, stated: float | No
     return [f"rate {rate:.9g} Hz from the times of {clock.name}"] if len(table.clocks) > 1 else []
 
 
-def _check_gaps(recording: Recording, channels: list[str], options: ClockOptions) -> tuple[str, ...]:
-    """Notes on the channels that have no value for longer than is bridged.
-
-    Raises FieldError instead, unless such gaps are to be kept.
-    """
-    notes = []
-    for name in channels:
-        missing = np.isnan(recording.values[:, recording.names.index(name)])
-        if not missing.any() or missing.all():
-            continue
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
-        lengths = edges[1::2] - edges[::2]
-        worst = int(lengths.argmax())
-        longest, begin = lengths[worst] / recording.rate, edges[2 * worst] / recording.rate
-        if lengths[worst] <= options.longest_gap * recording.rate:
-            continue
-        if options.gaps == "refuse":
-            raise FieldError(
-                "longest_gap",
-                f"is {options.longest_gap:g}; at least {longest:g} in s is needed, for {name} has no value from "
-                f"{begin:g} s on, or gaps kept, or the channel skipped",
-                recording.source,
-            )
-        notes.append(f"{name} has no value for {longest:g} s from {begin:g} s on: kept as a gap")
-    return tuple(notes)
-
-
-def _from_bag(path: str | Path, options: ClockOptions, topic: str) -> Recording:
+def _from_bag(path: str | Path, rate: float | None, topic: str) -> Recording:
     series = read_named_values(path, (topic,))
-    notes: list[str] = []
-    values = _without_empty_end(f"{path}: topic {series.topic}", series.values, notes)
-    fitted = fit_clock(str(path), series.times[: len(values)], series.place, options)
-    return Recording(
-        str(path), series.names, ("",) * len(series.names), fitted.even(values), fitted.rate,
-        (*notes, *fitted.notes), fitted.start,
-    )  # fmt: skip
+    values, empty = without_empty_end(f"{path}: topic {series.topic}", series.values)
+    fitted = fit_clock(str(path), series.times[: len(values)], series.place, rate)
+    units_of = ("",) * len(series.names)
+    notes = empty + fitted.notes
+    return Recording(str(path), series.names, units_of, fitted.even(values), fitted.rate, notes, fitted.start)
 
 
-def _without_empty_end(source: str | Path, values: FloatArray, notes: list[str]) -> FloatArray:
+def without_empty_end(source: str | Path, values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Leave out the rows at the end that hold no value at all, and note how many."""
-    for kept in range(len(values), 0, -1):
-        if np.isfinite(values[kept - 1]).any():
-            break
-    else:
+    kept = len(values)
+    while kept and not np.isfinite(values[kept - 1]).any():
+        kept -= 1
+    if not kept:
         raise UserError(f"{source}: holds no value; at least one sample is needed")
-    if kept < len(values):
-        notes.append(f"rows without any value at the end, left out: {len(values) - kept}")
-    return values[:kept]
+    empty = len(values) - kept
+    return values[:kept], (f"rows without any value at the end, left out: {empty}",) if empty else ()

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 from limb_nodes.errors import UserError
 from limb_nodes.signals.activation import load_activation
-from limb_nodes.signals.clock import ClockOptions
 from limb_nodes.signals.recording import Recording, read_recording
-from limb_nodes.signals.text_options import TextOptions
 from tests.recordings import recorded
 
 RF_BF = ("RF", "BF")
@@ -33,7 +31,7 @@ class Right:
     left: tuple[str, ...] = ()
     start: float | None = 0.0
     rate_given: float | None = None
-    text: TextOptions = field(default_factory=TextOptions)
+    missing: int = 0
 
 
 def plain(unit: str, rate: float = 1000.0, power: int = 0, samples: int = 1499, **changes: object) -> Right:
@@ -57,7 +55,8 @@ READ = {
     "artefact/clean.csv": plain("mV", **ARTEFACT),
     "artefact/clipped.csv": plain("mV", **{**ARTEFACT, "first": (0.005184, -0.01304), "last": (0.009965, 0.005512)}),
     "artefact/spike.csv": plain("mV", **ARTEFACT),
-    "artefact/nan_10ms.csv": plain("mV", **ARTEFACT),
+    "artefact/nan_10ms.csv": plain("mV", **ARTEFACT, missing=10),
+    "artefact/nan_2s.csv": plain("mV", **ARTEFACT, missing=2000),
     "dead-channel/dead.csv": Right(
         ("RF", "BF", "IM EMG9"), ("mV",) * 3, 1000.0, 1499, (1.728, 1.535, 0.0), (-4.43, 9.761, 0.0)
     ),
@@ -152,7 +151,6 @@ READ = {
     ),
 }  # fmt: skip
 REFUSED = {
-    "artefact/nan_2s.csv": "RF has no value from 1 s on, or gaps kept",
     "headers/no_time_sampleidx.csv": "rate is missing: there are no times",
 }
 
@@ -162,6 +160,7 @@ def is_right(recording: Recording, right: Right) -> None:
     assert recording.units == right.units
     assert recording.rate == pytest.approx(right.rate, rel=1e-4)
     assert len(recording.values) == right.samples
+    assert np.isnan(recording.values).sum() == right.missing
     np.testing.assert_array_equal(recording.values[0], right.first)
     np.testing.assert_array_equal(recording.values[-1], right.last)
     notes = "\n".join(recording.notes)
@@ -175,7 +174,7 @@ def is_right(recording: Recording, right: Right) -> None:
 @pytest.mark.parametrize("name", READ)
 def test_file_is_read_right_by_number(name: str) -> None:
     right = READ[name]
-    is_right(read_recording(recorded(f"emg_formats/{name}"), rate=right.rate_given, text=right.text), right)
+    is_right(read_recording(recorded(f"emg_formats/{name}"), rate=right.rate_given), right)
 
 
 @pytest.mark.parametrize("name", REFUSED)
@@ -191,13 +190,6 @@ def test_every_file_is_in_the_table() -> None:
     folder = recorded("emg_formats")
     files = {str(path.relative_to(folder)) for path in folder.glob("*/*")}
     assert files == {*READ, *REFUSED}
-
-
-def test_long_gap_is_kept_if_asked() -> None:
-    recording = read_recording(recorded("emg_formats/artefact/nan_2s.csv"), clock=ClockOptions(gaps="keep"))
-    assert np.isnan(recording.values[1000:3000, 0]).all()
-    assert np.isnan(recording.values).sum() == 2000
-    assert any("no value for 2 s" in note for note in recording.notes)
 
 
 def test_excitations_of_opensim_are_activations() -> None:
