@@ -1,10 +1,24 @@
-"""The folder of a bag that is to be made. Commands check it before anything else, without loading what writes bags."""
+"""Names of bags, and the folder of one that is to be made: what commands check first, without loading a library."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from limb_nodes.errors import UserError
+
+SUFFIXES = (".mcap", ".db3")
+"""How the names of files of messages end."""
+
+PACKED = (".zstd", ".zst", ".lz4")
+"""What compression adds to them."""
+
+
+def is_bag_file(path: PurePath) -> bool:
+    """Whether a file's name says that it is a bag's file of messages, compressed or not."""
+    suffixes = [suffix.lower() for suffix in path.suffixes]
+    if suffixes and suffixes[-1] in PACKED:
+        suffixes.pop()
+    return bool(suffixes) and suffixes[-1] in SUFFIXES
 
 
 def refuse_existing(path: Path) -> None:

@@ -2,30 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import heapq
+import itertools
+from collections.abc import Collection, Iterator
+from contextlib import ExitStack
+from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Connection, MessageDefinitionFormat
-from rosbags.rosbag2 import Reader
-from rosbags.typesys import get_types_from_msg
+from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 from rosbags.typesys.store import Typestore
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from limb_nodes.bags.columns import Columns, columns
-from limb_nodes.bags.types import RUN_INFO, absolute, limb_typestore
+from limb_nodes.bags.fields import Block, blocks, kinds
+from limb_nodes.bags.files import BagFile, most_bytes, one_line, open_files, unpack_message
+from limb_nodes.bags.types import RUN_INFO, absolute, typestore_of
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import IntArray
 
+_BATCH = 2**15
+
 
 class BagReader:
-    """Reads one bag (a rosbag2 folder, or the MCAP or sqlite3 file in it); a context manager.
+    """Reads one bag; a context manager.
+
+    A bag is a rosbag2 folder, with or without its metadata.yaml, or one file of messages. Its files are MCAP or
+    sqlite3, one or several; files, chunks or messages may be compressed.
 
     Topics may be asked for by their absolute name, or by the end of it if only one topic ends so: `joint_states`
-    finds `/left/joint_states`. Types that this installation does not know are read by the definition in the bag.
+    finds `/left/joint_states`. Messages are decoded by the definition in the bag, or by that of this installation if
+    there is none.
 
     Args:
         path: the bag.
@@ -37,36 +48,39 @@ class BagReader:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        if not self.path.exists():
-            raise UserError(f"{self.path}: no such bag")
-        if self.path.is_dir() and not (self.path / "metadata.yaml").exists():
-            if any(self.path.glob("*.mcap")):
-                raise _unfinished(self.path)
-            raise UserError(f"{self.path}: is no bag; a folder with a metadata.yaml and a file of messages is needed")
-        try:
-            self._reader = Reader(self.path)
-            self._reader.open()
-        except Exception as error:  # the library has no one class for what damage can do to it
-            if "end magic" in str(error):
-                raise _unfinished(self.path) from None
-            raise UserError(f"{self.path}: is no bag that can be read: {_one_line(error)}") from None
-        self._topics: dict[str, Connection] = {}
-        for connection in self._reader.connections:
-            self._topics.setdefault(connection.topic, connection)
+        with ExitStack() as stack:
+            self._files = open_files(self.path, stack)
+            self._most_bytes = most_bytes(self.path)
+            self._stack = stack.pop_all()
+        self._topics: dict[str, list[tuple[BagFile, Connection]]] = {}
+        for file in self._files:
+            for connection in file.connections:
+                self._topics.setdefault(connection.topic, []).append((file, connection))
+        self._stores: dict[str, Typestore] = {}
 
     @property
     def topics(self) -> dict[str, str]:
         """Absolute name of each topic -> its message type."""
-        return {name: connection.msgtype for name, connection in sorted(self._topics.items())}
+        return {name: parts[0][1].msgtype for name, parts in sorted(self._topics.items())}
 
     def count(self, topic: str) -> int:
         """The number of messages of a topic, 0 if the bag does not have it."""
         name = self._find(topic)
-        return sum(c.msgcount for c in self._reader.connections if c.topic == name) if name else 0
+        return sum(connection.msgcount for _, connection in self._topics[name]) if name else 0
 
     def has(self, topic: str) -> bool:
         """Whether the bag has a topic with at least one message."""
         return self.count(topic) > 0
+
+    def name(self, topic: str) -> str:
+        """The absolute name of a topic. Raises UserError if the bag does not have it, or with several types."""
+        name = self._find(topic)
+        if name is None:
+            raise UserError(f"{self.path}: no topic {topic}; the bag has {', '.join(self.topics) or 'none'}")
+        types = sorted({connection.msgtype for _, connection in self._topics[name]})
+        if len(types) > 1:
+            raise UserError(f"{self.path}: topic {name} has messages of the types {', '.join(types)}; one is needed")
+        return name
 
     def run_info(self) -> dict[str, Any]:
         """What the recorder wrote down about the run: limb, limb_file, parameters, versions, seed, command.
@@ -94,9 +108,8 @@ class BagReader:
         Raises:
             UserError: the bag has no such topic (at the call, not at the first message), or is damaged.
         """
-        connection = self._connection(topic)
-        store = self._types(connection)
-        return self._decoded(connection, store)
+        name = self.name(topic)
+        return self._decoded(name, self._types(name))
 
     def read_raw(self, topic: str) -> Iterator[tuple[int, bytes]]:
         """As `read_topic`, the messages serialised (CDR), as rclpy publishes them without decoding.
@@ -104,7 +117,7 @@ class BagReader:
         Raises:
             UserError: as `read_topic`.
         """
-        return self._raw(self._connection(topic))
+        return self._raw(self.name(topic))
 
     def table(self, topic: str) -> Columns:
         """A whole topic as arrays, for topics whose messages all have the same shape.
@@ -120,21 +133,56 @@ class BagReader:
             UserError: no such topic, no message in it, messages of different shape or with different names,
                 or a damaged bag.
         """
-        connection = self._connection(topic)
-        rows = list(self._raw(connection))
-        if not rows:
-            raise UserError(f"{self.path}: topic {connection.topic} has no message")
-        stamps: IntArray = np.array([stamp for stamp, _ in rows], dtype=np.int64)
+        name = self.name(topic)
+        stamps, messages = self._messages(name)
         try:
-            fields = columns([data for _, data in rows], connection.msgtype, self._types(connection))
+            fields = columns(messages, self.topics[name], self._types(name))
         except ValueError as error:
-            raise UserError(f"{self.path}: topic {connection.topic}: {error}") from None
+            raise UserError(f"{self.path}: topic {name}: {error}") from None
         return {"time": stamps * 1e-9, "stamp": stamps, **fields}
+
+    def kinds(self, topic: str) -> dict[str, str]:
+        """The fields of a topic's type by their path, `outer.inner`, and what they hold; `fields.kinds` says how.
+
+        Raises:
+            UserError: the bag has no such topic, or its type is not known.
+        """
+        name = self.name(topic)
+        return kinds(self.topics[name], self._types(name))
+
+    def blocks(self, topic: str, paths: Collection[str], most: int | None = None) -> tuple[IntArray, list[Block]]:
+        """Some fields of a whole topic, whose messages may differ in shape.
+
+        Args:
+            topic: as for `read_topic`.
+            paths: the fields, as `kinds` names them.
+            most: how many messages, from the first on; None for all.
+
+        Returns:
+            The bag time of each message, ns, and the messages as arrays, those of one shape together.
+
+        Raises:
+            UserError: no such topic, no message in it, too many shapes, or a damaged bag.
+        """
+        name = self.name(topic)
+        store, msgtype = self._types(name), self.topics[name]
+        rows = itertools.islice(self._raw(name), most)
+        stamps: list[int] = []
+        result: list[Block] = []
+        try:
+            # Messages take several times the memory of the numbers in them.
+            while batch := list(itertools.islice(rows, _BATCH)):
+                result += blocks([data for _, data in batch], msgtype, store, paths, len(stamps))
+                stamps += [stamp for stamp, _ in batch]
+        except ValueError as error:
+            raise UserError(f"{self.path}: topic {name}: {error}") from None
+        if not stamps:
+            raise UserError(f"{self.path}: topic {name} has no message")
+        return np.array(stamps, dtype=np.int64), result
 
     def close(self) -> None:
         """Close the file. Safe to call again."""
-        if self._reader.is_open:
-            self._reader.close()
+        self._stack.close()
 
     def __enter__(self) -> BagReader:
         return self
@@ -154,47 +202,63 @@ class BagReader:
             raise UserError(f"{self.path}: topic {topic} is there twice; one of {', '.join(sorted(matches))} is needed")
         return matches[0] if matches else None
 
-    def _connection(self, topic: str) -> Connection:
-        name = self._find(topic)
-        if name is None:
-            raise UserError(f"{self.path}: no topic {topic}; the bag has {', '.join(self.topics) or 'none'}")
-        return self._topics[name]
+    def _types(self, name: str) -> Typestore:
+        """The types to decode a topic with, by the definition in the bag if there is one."""
+        if name not in self._stores:
+            connections = [connection for _, connection in self._topics[name]]
+            for connection in connections:
+                form = connection.ext.serialization_format  # type: ignore[union-attr]
+                if form != "cdr":
+                    raise UserError(f"{self.path}: topic {name} is serialised as {form}; cdr is needed")
+            defined = (one for one in connections if one.msgdef.format != MessageDefinitionFormat.NONE)
+            connection = next(defined, connections[0])
+            try:
+                self._stores[name] = typestore_of(connection.msgtype, connection.msgdef)
+            except ValueError as error:
+                raise UserError(
+                    f"{self.path}: topic {name} has the unknown type {connection.msgtype}: {error}"
+                ) from None
+        return self._stores[name]
 
-    def _types(self, connection: Connection) -> Typestore:
-        """The types to decode a topic with, completed from the bag if they are not known."""
-        store = limb_typestore()
-        if connection.msgtype not in store.fielddefs:
-            definition = connection.msgdef
-            if definition.format != MessageDefinitionFormat.MSG:
-                raise UserError(f"{self.path}: topic {connection.topic} has the unknown type {connection.msgtype}")
-            types = get_types_from_msg(definition.data, connection.msgtype)
-            store.register({name: value for name, value in types.items() if name not in store.fielddefs})
-        return store
+    def _messages(self, name: str) -> tuple[IntArray, list[bytes]]:
+        """Time (ns) and bytes of all messages of a topic, at least one."""
+        rows = list(self._raw(name))
+        if not rows:
+            raise UserError(f"{self.path}: topic {name} has no message")
+        return np.array([stamp for stamp, _ in rows], dtype=np.int64), [data for _, data in rows]
 
-    def _raw(self, connection: Connection) -> Iterator[tuple[int, bytes]]:
-        """Time (ns) and bytes of each message of the connection's topic."""
-        same = [other for other in self._reader.connections if other.topic == connection.topic]
+    def _raw(self, name: str) -> Iterator[tuple[int, bytes]]:
+        """Time (ns) and bytes of each message of a topic, of all files in the order of time."""
+        parts: dict[int, list[Connection]] = {}
+        for file, connection in self._topics[name]:
+            parts.setdefault(self._files.index(file), []).append(connection)
+        size = 0
         try:
-            for _, stamp, data in self._reader.messages(same):
-                yield stamp, data
+            files = [self._files[index].messages(connections) for index, connections in parts.items()]
+            for _, stamp, data in heapq.merge(*files, key=itemgetter(1)):
+                message = unpack_message(data)
+                size += len(message)
+                if size > self._most_bytes:
+                    break
+                yield int(stamp), message
         except Exception as error:
             raise self._damaged(error) from None
+        if size > self._most_bytes:
+            raise UserError(
+                f"{self.path}: topic {name} takes more than {self._most_bytes} bytes unpacked; a bag of measured "
+                "values is needed"
+            )
 
-    def _decoded(self, connection: Connection, store: Typestore) -> Iterator[tuple[int, Any]]:
-        for stamp, data in self._raw(connection):
+    def _decoded(self, name: str, store: Typestore) -> Iterator[tuple[int, Any]]:
+        msgtype = self.topics[name]
+        for stamp, data in self._raw(name):
             try:
-                message = store.deserialize_cdr(data, connection.msgtype)
+                message = store.deserialize_cdr(data, msgtype)
             except Exception as error:
                 raise self._damaged(error) from None
             yield stamp, message
 
     def _damaged(self, error: Exception) -> UserError:
-        return UserError(f"{self.path}: the bag is damaged: {_one_line(error)}; try `limb recover {self.path}`")
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split()) or "it is damaged"
-
-
-def _unfinished(path: Path) -> UserError:
-    return UserError(f"{path}: the recorder did not close this bag; `limb recover {path}` makes a readable one of it")
+        database = any(isinstance(file, Sqlite3Reader) for file in self._files)
+        repair = "sqlite3 FILE .recover" if database else f"limb recover {self.path}"
+        return UserError(f"{self.path}: the bag is damaged: {one_line(error)}; try `{repair}`")

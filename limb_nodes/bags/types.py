@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat, Nodetype
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from limb_nodes.errors import UserError
 
+STORE = getattr(Stores, "ROS2_KILTED", Stores.LATEST)
 RUN_INFO = "run_info"
 """The topic on which a bag holds what is needed to run it again, as a std_msgs/String in YAML."""
 
@@ -41,10 +42,50 @@ def limb_typestore() -> Typestore:
     Raises:
         UserError: limb_msgs is not installed.
     """
-    store = get_typestore(getattr(Stores, "ROS2_KILTED", Stores.LATEST))
+    store = get_typestore(STORE)
     for path in sorted(message_folder().glob("*.msg")):
         store.register(get_types_from_msg(path.read_text(encoding="utf-8"), f"limb_msgs/msg/{path.stem}"))
     return store
+
+
+def typestore_of(msgtype: str, definition: MessageDefinition) -> Typestore:
+    """The types to decode messages of a bag with: those that are installed, unless the bag defines them otherwise.
+
+    Args:
+        msgtype: the messages' type.
+        definition: what the bag says of it.
+
+    Raises:
+        ValueError: the type is in neither, or the definition can't be read.
+    """
+    store = limb_typestore()
+    if definition.format == MessageDefinitionFormat.NONE:
+        if msgtype not in store.fielddefs:
+            raise ValueError("it is not installed, and the bag does not define it; `ros2 bag convert` to MCAP does")
+        return store
+    try:
+        types = _defined(msgtype, definition)
+        if all(store.fielddefs.get(name) == fields for name, fields in types.items()):
+            return store
+        own = get_typestore(STORE)
+        for name in types:
+            own.fielddefs.pop(name, None)
+            own.types.pop(name, None)
+        own.register(types)
+        own.get_msgdef(msgtype)
+    except Exception as error:  # the library has no one class for what a definition can be
+        raise ValueError(f"its definition in the bag cannot be read, {' '.join(str(error).split())[:200]}") from None
+    return own
+
+
+@functools.lru_cache(maxsize=256)
+def _defined(msgtype: str, definition: MessageDefinition) -> dict[str, Any]:
+    """Every type of a definition, by name, as rosbags describes it."""
+    if definition.format == MessageDefinitionFormat.MSG:
+        return dict(get_types_from_msg(definition.data, msgtype))
+    # Each type of a bundle stands below a line of =, and one that names it.
+    text = "\n".join(line for line in definition.data.splitlines() if not line.startswith(("====", "IDL: ")))
+    return dict(get_types_from_idl(text))
 
 
 def make_message(msgtype: str, stamp_ns: int | None = None, **fields: Any) -> Any:

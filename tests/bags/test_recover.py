@@ -12,6 +12,7 @@ import pytest
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
+from rosbags.rosbag2 import Reader
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.bags.recover import recover
@@ -152,8 +153,9 @@ def test_a_whole_bag_is_copied(tmp_path: Path) -> None:
     assert result.counts == {"/run_info": 1, "/joint_states": 1}
     with BagReader(tmp_path / "whole") as whole, BagReader(tmp_path / "out") as copy:
         assert whole.topics == copy.topics
-        assert [c.ext for c in whole._reader.connections] == [c.ext for c in copy._reader.connections]
-        assert [c.digest for c in whole._reader.connections] == [c.digest for c in copy._reader.connections]
+    with Reader(tmp_path / "whole") as plain, Reader(tmp_path / "out") as plain_copy:
+        assert [c.ext for c in plain.connections] == [c.ext for c in plain_copy.connections]
+        assert [c.digest for c in plain.connections] == [c.digest for c in plain_copy.connections]
 
 
 def test_nothing_is_written_if_there_is_nothing_to_recover(tmp_path: Path) -> None:
