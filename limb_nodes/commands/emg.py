@@ -10,9 +10,10 @@ from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.commands.text_options import add_text_options, text_options
 from limb_nodes.errors import FieldError
 from limb_nodes.foundation.text_table import aligned
+from limb_nodes.signals.bag_field import BagOptions
 from limb_nodes.signals.emg import EnvelopeOptions, Envelopes, envelopes, write_envelopes
 from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
-from limb_nodes.signals.recording import RAW_TOPIC, read_recording
+from limb_nodes.signals.recording import read_recording
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -32,10 +33,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="HZ",
         help="samples per second, whatever the file says (default: as its times say)",
     )
-    reading.add_argument("--topic", default=RAW_TOPIC, help=f"topic of the raw EMG in a bag (default {RAW_TOPIC})")
     reading.add_argument(
         "--channel", dest="channels", action="append", default=[], metavar="COLUMN[=NAME]",
         help="take this EMG column, under another name if given; repeatable (default: all in V, mV, uV or no unit)",
+    )  # fmt: skip
+    reading.add_argument(
+        "--channels", dest="names", metavar="NAMES",
+        help="take these EMG columns, as in RF,VM; of a bag whose messages have no names, their names",
     )  # fmt: skip
     reading.add_argument(
         "--angle", dest="angles", action="append", default=[], metavar="COLUMN[=NAME]",
@@ -46,6 +50,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="leave out before its cells are read; repeatable",
     )  # fmt: skip
     add_text_options(parser)
+    add_bag_options(parser)
     steps = parser.add_argument_group("steps")
     band = steps.add_mutually_exclusive_group()
     band.add_argument(
@@ -78,16 +83,45 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     steps.add_argument("--resample", type=float, metavar="HZ", help="rate of the bag (default: the recording's)")
 
 
+def add_bag_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that choose what is read from a bag."""
+    group = parser.add_argument_group("how a bag is read")
+    group.add_argument(
+        "--topic", help="topic of the raw EMG in a bag (default: emg_raw, or the only one with channels)"
+    )
+    group.add_argument("--field", metavar="PATH", help="field of the values in its messages, as in outer.inner")
+    group.add_argument(
+        "--stamps", choices=("header", "received"),
+        help="times of a bag's samples (default: the stamps in the messages if they rise, else times of reception)",
+    )  # fmt: skip
+    group.add_argument(
+        "--rows", choices=("samples", "channels"),
+        help="in messages with several samples: one sample stands after the other, or one channel",
+    )  # fmt: skip
+
+
+def bag_options(args: argparse.Namespace) -> BagOptions:
+    """What was said of the bag. Raises FieldError if a name is empty or given twice."""
+    names = [] if args.names is None else [name.strip() for name in args.names.split(",")]
+    for name in names:
+        if not name or names.count(name) > 1:
+            raise FieldError("names", f"is {args.names}; different names such as RF,VM are needed")
+    return BagOptions(args.topic, args.field, tuple(names), args.stamps, args.rows)
+
+
 def run(args: argparse.Namespace) -> int:
     """Read, process, write, and print what was done. Raises UserError before anything is written."""
     refuse_existing(Path(args.out))
     channels = dict(_pairs("channels", args.channels, same=True))
     angles = dict(_pairs("angles", args.angles, same=True))
+    bag = bag_options(args)
+    for name in bag.names:
+        channels.setdefault(name, name)
     recording = read_recording(
         args.file,
         rate=args.rate,
-        topic=args.topic,
         text=text_options(args, [*channels, *angles]),
+        bag=bag,
     )
     options = EnvelopeOptions(
         band=None if args.no_band_pass else (args.band[0], args.band[1]),

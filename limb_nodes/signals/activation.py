@@ -12,6 +12,7 @@ import numpy as np
 from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.signals.bag_field import BagOptions
 from limb_nodes.signals.named_values import is_bag, read_named_values
 from limb_nodes.signals.table import check_times, is_value, read_table
 from limb_nodes.signals.text_options import TextOptions
@@ -63,8 +64,9 @@ def load_activation(
 ) -> Activation:
     """Load activations for some muscles, at k / rate for k = 0 ... duration * rate.
 
-    source: a bag with the topic `activation` or `emg_envelope`; a text table (`limb_nodes.signals.table`), such as CSV
-    or OpenSim's `.mot`, with a column of times and one per muscle; a waveform YAML (`limb_nodes.signals.waveform`); or
+    source: a bag with the topic `activation` or `emg_envelope`, or another that is named behind the bag, as in
+    `BAG:/emg/envelope` or `BAG:/emg/envelope:field`; a text table (`limb_nodes.signals.table`), such as CSV or
+    OpenSim's `.mot`, with a column of times and one per muscle; a waveform YAML (`limb_nodes.signals.waveform`); or
     constants in a line, `flexor=0.9,extensor=0`. Recordings are taken along straight lines between their samples, from
     their first sample on. Muscles of the source that are not asked for are left out, and noted.
 
@@ -77,7 +79,7 @@ def load_activation(
     RATE.check(rate)
     if duration is not None:
         _ticks(duration, rate)
-    if is_bag(source):
+    if _is_bag(source):
         return _from_samples(_bag(source), muscles, rate, duration)
     if not os.path.exists(source):
         if "=" not in source:
@@ -175,8 +177,21 @@ def _table(source: str, muscles: Sequence[str], text: TextOptions | None) -> _Sa
 
 
 def _bag(source: str) -> _Samples:
-    series = read_named_values(source, ACTIVATION_TOPICS)
+    path, _, place = source.partition(":") if not os.path.exists(source) else (source, "", "")
+    topic, _, field = place.partition(":")
+    try:
+        series = read_named_values(path, ACTIVATION_TOPICS, BagOptions(topic=topic or None, field=field or None))
+    except FieldError as error:
+        raise UserError(f"{error}; BAG:TOPIC:FIELD chooses, and `limb emg` has options for more") from None
     check_times(source, series.times, series.place)
     missing = int(series.ticks[-1] - series.ticks[0]) + 1 - len(series.ticks)
-    notes = (f"ticks missing on {series.topic}, bridged by straight lines: {missing}",) if missing > 0 else ()
+    notes = series.notes
+    if missing > 0:
+        notes += (f"{series.counter}s missing on {series.topic}, bridged by straight lines: {missing}",)
     return _Samples(source, series.times, series.names, series.values, series.place, notes)
+
+
+def _is_bag(source: str) -> bool:
+    """Whether a source is a bag, or one with a topic behind a colon."""
+    path, colon, topic = source.partition(":")
+    return is_bag(source) or bool(colon and topic and os.path.exists(path) and is_bag(path))

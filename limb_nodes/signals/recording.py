@@ -11,12 +11,12 @@ import numpy as np
 from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.signals import units
+from limb_nodes.signals.bag_field import BagOptions
 from limb_nodes.signals.clock import RATE, Fitted, fit_clock
-from limb_nodes.signals.named_values import is_bag, read_named_values
+from limb_nodes.signals.named_values import is_bag
 from limb_nodes.signals.table import Clock, TextTable, read_table
 from limb_nodes.signals.text_options import TextOptions
 
-RAW_TOPIC = "emg_raw"
 # Muscles are not recorded that slowly: such times are in another unit than s, or count samples.
 _SLOWEST = 10.0
 
@@ -50,15 +50,16 @@ class Recording:
 
 
 def read_recording(
-    path: str | Path, *, rate: float | None = None, topic: str = RAW_TOPIC, text: TextOptions | None = None
+    path: str | Path, *, rate: float | None = None, text: TextOptions | None = None, bag: BagOptions | None = None
 ) -> Recording:
     """Read a recording from a text file or from a bag.
 
-    A file is a text table (`limb_nodes.signals.table`), with or without a column of times. A bag holds its channels
-    as messages with `name` and `activation` on `topic`. Times give an even clock (`limb_nodes.signals.clock`).
+    A file is a text table (`limb_nodes.signals.table`), with or without a column of times. A bag holds its channels as
+    numbers in messages, with their names (`limb_nodes.signals.bag_recording`). Times give an even clock
+    (`limb_nodes.signals.clock`).
 
     rate: samples per second, whatever the times say; if None, it follows from them, or from the header.
-    text: how a text file is to be read.
+    text: how a text file is to be read. bag: what of a bag is read.
 
     Raises UserError if the input cannot be read, its rate is unknown, or its times have no even clock; FieldError if
     an option is at fault or could decide.
@@ -66,7 +67,10 @@ def read_recording(
     if rate is not None:
         RATE.check(rate)
     if is_bag(path):
-        return _from_bag(path, rate, topic)
+        # Only here: it reads recordings too.
+        from limb_nodes.signals.bag_recording import read_bag_recording
+
+        return read_bag_recording(path, rate, bag)
     return _from_table(read_table(path, text), text or TextOptions(), rate)
 
 
@@ -221,15 +225,6 @@ def _clock_notes(table: TextTable, clock: Clock, rate: float, stated: float | No
     if stated is not None:
         return [f"rate {rate:.9g} Hz from the times of {clock.name}; the header states {stated:g} Hz"]
     return [f"rate {rate:.9g} Hz from the times of {clock.name}"] if len(table.clocks) > 1 else []
-
-
-def _from_bag(path: str | Path, rate: float | None, topic: str) -> Recording:
-    series = read_named_values(path, (topic,))
-    values, empty = without_empty_end(f"{path}: topic {series.topic}", series.values)
-    fitted = fit_clock(str(path), series.times[: len(values)], series.place, rate)
-    units_of = ("",) * len(series.names)
-    notes = empty + fitted.notes
-    return Recording(str(path), series.names, units_of, fitted.even(values), fitted.rate, notes, fitted.start)
 
 
 def without_empty_end(source: str | Path, values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:

@@ -44,6 +44,38 @@ def test_bag_is_taken_as_recorded(bag):
     assert result.notes == ("not used, for the limb has no such muscle: other",)
 
 
+def test_another_topic_of_a_bag_follows_a_colon(bag):
+    other = bag("left/envelopes")
+    assert load_activation(other, MUSCLES, 100.0).notes[0] == "read from the topic /left/envelopes, field activation"
+    for source in (f"{other}:envelopes", f"{other}:/left/envelopes", f"{other}:/left/envelopes:activation"):
+        np.testing.assert_array_equal(
+            load_activation(source, MUSCLES, 100.0).values, load_activation(other, MUSCLES, 100.0).values
+        )
+    bad(
+        f"{other}:/right", "topic is /right, on which there is no message; one of /left/envelopes (field activation) is"
+    )
+    bad(f"{other}:envelopes:tick", "message 1 holds 1 values; 3 are needed")
+    bad(
+        f"{other}:envelopes:name",
+        "field is name, which holds string[]; a field of numbers of /left/envelopes is needed",
+    )
+    bad(f"{other}:", "which is no file; a bag, a CSV file")
+    bad("nothing:topic", "which is no file; a bag, a CSV file")
+
+
+def test_stamps_are_the_times_of_envelopes(tmp_path):
+    """As `ros2 bag record` keeps them: received in real time, stamped in simulation time."""
+    with BagWriter(tmp_path / "bag", {}) as writer:
+        for tick in range(11):
+            message = make_message(
+                "limb_msgs/msg/MuscleActivation", tick * 10_000_000, tick=tick, name=["m"], activation=[tick / 10]
+            )
+            writer.write("emg_envelope", 1_700_000_000_000_000_000 + tick // 4 * 37_000_000, message)
+    result = load_activation(str(tmp_path / "bag"), ["m"], 100.0)
+    np.testing.assert_array_equal(result.values[:, 0], np.arange(11) / 10)
+    assert result.notes == ("times are the stamps in the messages; times of reception differ by up to 0.033 s",)
+
+
 def test_another_rate_is_interpolated(bag):
     result = load_activation(bag(), MUSCLES, 250.0, 0.1)
     np.testing.assert_allclose(result.values[:, 1], np.arange(26) / 25, atol=1e-12)
@@ -60,17 +92,18 @@ def test_recorded_run_gives_what_drove_it(bag, tmp_path):
     with BagWriter(path, {}) as writer:
         for tick in range(3):
             for topic, value in (("emg_envelope", 0.25), ("activation", 0.75)):
+                stamp = tick * 1_000_000
                 message = make_message(
-                    "limb_msgs/msg/MuscleActivation", tick, tick=tick, name=["m"], activation=[value]
+                    "limb_msgs/msg/MuscleActivation", stamp, tick=tick, name=["m"], activation=[value]
                 )
-                writer.write(topic, tick * 1_000_000, message)
+                writer.write(topic, stamp, message)
     assert load_activation(str(path), ["m"], 1000.0).values.tolist() == [[0.75]] * 3
 
 
 def test_missing_ticks_are_bridged_and_noted(bag):
     result = load_activation(bag(ticks=[0, 1, 2, 5, 6]), MUSCLES, 100.0)
     np.testing.assert_allclose(result.values[:, 1], np.arange(7) / 10, atol=1e-12)
-    assert "ticks missing on emg_envelope, bridged by straight lines: 2" in result.notes
+    assert "ticks missing on /emg_envelope, bridged by straight lines: 2" in result.notes
 
 
 def test_csv_may_be_uneven_and_start_late(write):
@@ -122,12 +155,14 @@ def test_bad_csv(write, text, words):
 
 
 def test_bad_bags(bag, tmp_path):
-    bad(bag("external", name="a"), "no message on activation or emg_envelope; the bag has /external")
+    with BagWriter(tmp_path / "a", {}) as writer:
+        writer.write("external", 0, make_message("std_msgs/msg/String", data="flexor"))
+    bad(str(tmp_path / "a"), "no message on activation or emg_envelope; the bag has /external, /run_info")
     bad(bag(name="b"), "no column 'knee'", muscles=["knee"])
     values = [[0, 0, 0], [0, 0, float("nan")], [0, 0, 0]]
     bad(bag(values=values, ticks=range(3), name="c"), "tick 1: flexor is missing; a number in [0, 1] is needed")
     values[1][2] = 1.25
-    bad(bag(values=values, ticks=range(3), name="d"), "topic emg_envelope, tick 1: flexor is 1.25; a number in [0, 1]")
+    bad(bag(values=values, ticks=range(3), name="d"), "topic /emg_envelope, tick 1: flexor is 1.25; a number in [0, 1]")
     (tmp_path / "empty").mkdir()
     bad(str(tmp_path / "empty"), "is no bag")
 

@@ -256,4 +256,6 @@ def test_existing_output_is_refused_and_kept(raw_file, tmp_path, capsys):
 def test_bag_without_the_topic_says_what_there_is(raw_file, tmp_path, capsys):
     limb_emg(raw_file, "-o", tmp_path / "env", "--rate", 1000)
     line = refusal(capsys, tmp_path / "env", "-o", tmp_path / "again")
-    assert "no message on emg_raw; the bag has /emg_envelope, /reference_angle" in line
+    assert (
+        "no message on emg_raw; one of /emg_envelope (field activation), /reference_angle (field position) is" in line
+    )
