@@ -26,6 +26,7 @@ from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import IntArray
 
 _BATCH = 2**15
+_FIRST, _LAST = -(2**63), 2**63 - 1
 
 
 class BagReader:
@@ -236,6 +237,8 @@ class BagReader:
         try:
             files = [self._files[index].messages(connections) for index, connections in parts.items()]
             for _, stamp, data in heapq.merge(*files, key=itemgetter(1)):
+                if not _FIRST <= stamp <= _LAST:
+                    raise ValueError(f"a message is of the time {stamp} ns")
                 message = unpack_message(data)
                 size += len(message)
                 if size > self._most_bytes:

@@ -13,6 +13,7 @@ from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.signals.bag_field import BagOptions
+from limb_nodes.signals.clock import ClockOptions, fit_clock
 from limb_nodes.signals.named_values import is_bag, read_named_values
 from limb_nodes.signals.table import check_times, is_value, read_table
 from limb_nodes.signals.text_options import TextOptions
@@ -183,12 +184,18 @@ def _bag(source: str) -> _Samples:
         series = read_named_values(path, ACTIVATION_TOPICS, BagOptions(topic=topic or None, field=field or None))
     except FieldError as error:
         raise UserError(f"{error}; BAG:TOPIC:FIELD chooses, and `limb emg` has options for more") from None
-    check_times(source, series.times, series.place)
+    times, notes = series.times, series.notes
+    if not series.stamped and not (np.diff(times) > 0.0).all():
+        # Times of reception come in packets.
+        fitted = fit_clock(source, times, series.place, ClockOptions(gaps="keep"))
+        ticks = np.arange(len(times)) if fitted.ticks is None else fitted.ticks
+        times = ticks / fitted.rate + (0.0 if fitted.wander is None else fitted.wander)
+        notes += fitted.notes
+    check_times(source, times, series.place)
     missing = int(series.ticks[-1] - series.ticks[0]) + 1 - len(series.ticks)
-    notes = series.notes
-    if missing > 0:
-        notes += (f"{series.counter}s missing on {series.topic}, bridged by straight lines: {missing}",)
-    return _Samples(source, series.times, series.names, series.values, series.place, notes)
+    if missing > 0 and series.counter == "tick":
+        notes += (f"ticks missing on {series.topic}, bridged by straight lines: {missing}",)
+    return _Samples(source, times, series.names, series.values, series.place, notes)
 
 
 def _is_bag(source: str) -> bool:

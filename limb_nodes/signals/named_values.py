@@ -28,14 +28,16 @@ class NamedValues:
     """A topic's values over time.
 
     topic: its absolute name. names: one per column. values: [samples, names]. times: [samples], s from the first
-    message on. start: the first message's time, ns. ticks: [samples], the counter in the messages, or the number of the
-    message, from 1 on. counter: what `ticks` is called. notes: what a person should know, one sentence each.
+    message on. stamped: whether they are stamps in the messages, not times of reception. start: the first message's
+    time, ns. ticks: [samples], the counter in the messages if it rises, or the number of the message, from 1 on.
+    counter: what `ticks` is called. notes: what a person should know, one sentence each.
     """
 
     topic: str
     names: tuple[str, ...]
     values: FloatArray
     times: FloatArray
+    stamped: bool
     start: int
     ticks: IntArray
     counter: str
@@ -83,7 +85,9 @@ def read_named_values(
         raise UserError(f"{path}: topic {field.topic} holds no value in {field.path}; at least one sample is needed")
     if len(filled) < len(counts):
         notes += (f"messages without values on {field.topic}, left out: {len(counts) - len(filled)}",)
-    stamps, order, said = _stamps(str(path), field, options, received[filled], _whole(blocks, field.stamp, filled))
+    stamped = _whole(blocks, field.stamp, filled)
+    stamps, order, said = _stamps(str(path), field, options, received[filled], stamped)
+    used = stamped is not None and np.array_equal(stamps, stamped[order])
     order = filled[order]
     starts = np.zeros(len(received), dtype=np.int64)
     starts[order[1:]] = np.cumsum(counts[order])[:-1]
@@ -92,11 +96,12 @@ def read_named_values(
         table[starts[rows][:, np.newaxis] + np.arange(values.shape[1])] = values
     times, said_too = _times(str(path), field, stamps - stamps[0], counts[order], rate)
     ticks = _whole(blocks, field.tick, order) if counts.max() == 1 else None
-    counter = "tick" if ticks is not None else "message"
-    if ticks is None:
+    counter = "tick"
+    if ticks is None or not (np.diff(ticks) > 0).all():
+        counter = "message"
         ticks = np.repeat(order + 1, counts[order])
     series = NamedValues(
-        field.topic, samples.names, table, times, int(stamps[0]), ticks, counter, notes + said + said_too
+        field.topic, samples.names, table, times, used, int(stamps[0]), ticks, counter, notes + said + said_too
     )
     _check_finite(str(path), series)
     return series

@@ -165,6 +165,13 @@ def test_messages_beside_a_database_are_not_lost_without_a_word(tmp_path: Path) 
     assert "the recorder did not close this bag, a.db3-wal holds messages; `sqlite3 " in refusal(path)
 
 
+def test_a_time_that_no_clock_shows_is_damage(tmp_path: Path) -> None:
+    message = rows(1)[0][1]
+    assert "the bag is damaged: a message is of the time 1844674407370955" in refusal(
+        foreign.write_mcap(tmp_path / "a.mcap", "/emg", [(2**64 - 2, message)])
+    )
+
+
 @pytest.mark.parametrize("where", [0.3, 0.6, 0.9])
 @pytest.mark.parametrize("ending", [".mcap.zstd", ".mcap.lz4"])
 def test_a_packed_file_that_is_cut_short(ending: str, where: float, tmp_path: Path) -> None:

@@ -76,6 +76,16 @@ def test_stamps_are_the_times_of_envelopes(tmp_path):
     assert result.notes == ("times are the stamps in the messages; times of reception differ by up to 0.033 s",)
 
 
+def test_envelopes_that_were_received_in_packets(tmp_path):
+    with BagWriter(tmp_path / "bag", {}) as writer:
+        for k in range(200):
+            message = make_message("limb_msgs/msg/MuscleActivation", name=["m"], activation=[k / 200])
+            writer.write("emg_envelope", 5_000_000_000 + k // 4 * 40_000_000, message)
+    result = load_activation(str(tmp_path / "bag"), ["m"], 100.0, 1.9)
+    np.testing.assert_allclose(result.values[:, 0], np.arange(191) / 200, atol=1e-9)
+    assert any(note.startswith("times are those of reception, for the stamps do not rise") for note in result.notes)
+
+
 def test_another_rate_is_interpolated(bag):
     result = load_activation(bag(), MUSCLES, 250.0, 0.1)
     np.testing.assert_allclose(result.values[:, 1], np.arange(26) / 25, atol=1e-12)

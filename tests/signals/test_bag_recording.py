@@ -318,7 +318,10 @@ def test_names_in_another_order_are_put_in_order(tmp_path: Path) -> None:
         ([named([1.0, 2], [])] * 2, "names is missing, for topic /emg_raw, message 1 names no channels of its 2"),
         ([named([], [])] * 2, "topic /emg_raw holds no value in activation; at least one sample is needed"),
         ([named([np.nan], ["a"])] * 2, "topic /emg_raw: holds no value; at least one sample is needed"),
-        ([named([1.0], ["a"]), named([-np.inf], ["a"])], "topic /emg_raw, tick 0: a is -inf; a finite number, or NaN"),
+        (
+            [named([1.0], ["a"]), named([-np.inf], ["a"])],
+            "topic /emg_raw, message 2: a is -inf; a finite number, or NaN",
+        ),
         ([named([1.0], ["a"])], "holds one row; at least 2 are needed for a rate"),
         (
             [make_message("std_msgs/msg/String", data="1 2")] * 2,
@@ -439,6 +442,18 @@ def test_exact_stamps_give_the_envelope_of_exact_times_of_reception(jitter: str,
     assert result.values.shape == expected.values.shape
     assert np.abs(result.values - expected.values).max() < 0.02
     np.testing.assert_array_equal(read(path, stamps="header").values, recording.values)
+
+
+@pytest.mark.parametrize(
+    "jitter", ["noise of 0.3 ms", "packets of 32 at once", "a drift of 200 ppm and steps of 10 ms"]
+)
+def test_times_of_reception_alone_give_nearly_the_same_envelope(jitter: str, tmp_path: Path) -> None:
+    exact = np.arange(int(SECONDS * RATE)) / RATE
+    received = np.maximum.accumulate(JITTERS[jitter](np.random.default_rng(4), exact))
+    expected = envelopes(read(stamped(tmp_path / "exact", exact))).values
+    result = envelopes(read(stamped(tmp_path / "a", received), stamps="received")).values
+    assert result.shape == expected.shape
+    assert np.abs(result - expected).max() < 0.02
 
 
 def test_stamps_that_are_there_twice(tmp_path: Path) -> None:
