@@ -13,7 +13,7 @@ from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.signals.bag_field import BagOptions
-from limb_nodes.signals.clock import ClockOptions, fit_clock
+from limb_nodes.signals.clock import fit_clock
 from limb_nodes.signals.named_values import is_bag, read_named_values
 from limb_nodes.signals.table import check_times, is_value, read_table
 from limb_nodes.signals.text_options import TextOptions
@@ -187,7 +187,7 @@ def _bag(source: str) -> _Samples:
     times, notes = series.times, series.notes
     if not series.stamped and not (np.diff(times) > 0.0).all():
         # Times of reception come in packets.
-        fitted = fit_clock(source, times, series.place, ClockOptions(gaps="keep"))
+        fitted = fit_clock(source, times, series.place)
         ticks = np.arange(len(times)) if fitted.ticks is None else fitted.ticks
         times = ticks / fitted.rate + (0.0 if fitted.wander is None else fitted.wander)
         notes += fitted.notes

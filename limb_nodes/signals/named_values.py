@@ -19,6 +19,7 @@ from limb_nodes.signals.bag_samples import Samples
 if TYPE_CHECKING:
     from limb_nodes.bags.fields import Block
 
+_LEAST_IN_PACKETS = 30
 APART = 1e-6
 """Stamps and times of reception that differ by more than this (s) are two things."""
 
@@ -94,7 +95,8 @@ def read_named_values(
     table = np.empty((int(counts.sum()), len(samples.names)))
     for rows, values in parts:
         table[starts[rows][:, np.newaxis] + np.arange(values.shape[1])] = values
-    times, said_too = _times(str(path), field, stamps - stamps[0], counts[order], rate)
+    relative = stamps - stamps[0] if used else _in_packets(stamps - stamps[0])
+    times, said_too = _times(str(path), field, relative, counts[order], rate)
     ticks = _whole(blocks, field.tick, order) if counts.max() == 1 else None
     counter = "tick"
     if ticks is None or not (np.diff(ticks) > 0).all():
@@ -150,6 +152,17 @@ def _stamps(
         raise FieldError("stamps", f"is header; received is needed, for stamps are there twice: {where}", source)
     moved = int((order != np.arange(len(order))).sum())
     return stamped[order], order, (f"messages put in the order of their stamps: {moved}",)
+
+
+def _in_packets(received: IntArray) -> IntArray:
+    """Times of reception (ns); messages that came in packets, one right behind the other, all at that of the last."""
+    steps = np.diff(received)
+    behind = steps < 0.25 * received[-1] / max(1, len(steps))
+    if len(steps) < _LEAST_IN_PACKETS or behind.mean() < 0.6:
+        return received
+    last = np.flatnonzero(np.concatenate([~behind, [True]]))
+    result: IntArray = np.repeat(received[last], np.diff(last, prepend=-1))
+    return result
 
 
 def _after(stamps: IntArray, row: int) -> str:

@@ -396,7 +396,9 @@ JITTERS: dict[str, Callable[[np.random.Generator, np.ndarray], np.ndarray]] = {
     "noise of 0.3 ms": lambda rng, t: t + rng.normal(0.0, 0.3e-3, len(t)),
     "delays with a long tail": lambda rng, t: t + rng.exponential(4e-3, len(t)),
     "packets of 32 at once": lambda rng, t: t[np.minimum(np.arange(len(t)) // 32 * 32 + 31, len(t) - 1)],
-    "packets each 50 ms, spread by 0.1 ms": lambda rng, t: np.ceil(t / 0.05) * 0.05 + np.arange(len(t)) % 50 * 1e-4,
+    "packets each 50 ms, spread by 0.1 ms": lambda rng, t: (
+        np.arange(len(t)) // 50 * 0.05 + 0.05 + np.arange(len(t)) % 50 * 1e-4
+    ),
     "a pause of 0.8 s, then all at once": lambda rng, t: np.where((t > 2.0) & (t < 2.8), 2.8, t),
     "a drift of 200 ppm and steps of 10 ms": lambda rng, t: np.round(t * 1.0002, 2),
     "a clock that is set back by 2 s": lambda rng, t: t - 2.0 * (t > 3.0),
