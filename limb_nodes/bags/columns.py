@@ -82,7 +82,9 @@ class MessageLayout:
         self._data = data
         self._store = store
         self._elements = elements
-        self._order: Literal["<", ">"] = "<" if data[1:2] == b"\1" else ">"
+        if data[:2] not in (b"\0\0", b"\0\1"):
+            raise ValueError("a message is not in plain CDR, which is needed")
+        self._order: Literal["<", ">"] = "<" if data[1] else ">"
         self._at = 0
         self._take(4)
 

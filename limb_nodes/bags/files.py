@@ -156,6 +156,11 @@ def _open(path: Path, file: Path, stack: ExitStack) -> BagFile:
             magic = stream.read(8)
         if not magic and file.suffix.lower() == ".mcap":
             raise unfinished(path)
+        if magic == b"#ROSBAG ":
+            raise UserError(
+                f"{path}: is a bag of ROS 1; `rosbags-convert --src {file} --dst {file.with_suffix('')}` makes one of "
+                "ROS 2 of it"
+            )
         kind = _MAGIC.get(magic)
         if kind is None:
             raise UserError(f"{path}: is no bag that can be read: {file.name} is neither MCAP nor sqlite3")
@@ -171,6 +176,8 @@ def _open(path: Path, file: Path, stack: ExitStack) -> BagFile:
         text = one_line(error)
         if "end magic" in text:
             raise unfinished(path) from None
+        if isinstance(error, KeyError):
+            text = f"messages are defined in the unknown form {text}; ros2msg, ros2idl or omgidl is needed"
         if "Profile" in text:
             text = (
                 f"its messages are not marked as ROS 2's; `limb recover {path}` makes a readable bag of it if they are"

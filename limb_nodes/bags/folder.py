@@ -6,8 +6,8 @@ from pathlib import Path, PurePath
 
 from limb_nodes.errors import UserError
 
-SUFFIXES = (".mcap", ".db3")
-"""How the names of files of messages end."""
+SUFFIXES = (".mcap", ".db3", ".bag")
+"""How the names of files of messages end; the last is ROS 1's."""
 
 PACKED = (".zstd", ".zst", ".lz4")
 """What compression adds to them."""

@@ -11,8 +11,9 @@ from mcap.records import Channel, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Writer
+from rosbags.rosbag2.errors import ReaderError, WriterError
 from rosbags.rosbag2.metadata import parse_qos
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.bags.write import open_writer
@@ -28,12 +29,14 @@ class Recovered:
         counts: topic -> messages.
         end_ns: time of the last message, ns.
         truncated: whether a file ended in the middle of a record, so that messages after it are lost.
+        left_out: topics whose messages are not defined in a form of ROS 2, or whose definition is damaged.
     """
 
     path: Path
     counts: dict[str, int] = field(default_factory=dict)
     end_ns: int = 0
     truncated: bool = False
+    left_out: set[str] = field(default_factory=set)
 
 
 def recover(bag_dir: str | Path, out_dir: str | Path) -> Recovered:
@@ -75,8 +78,11 @@ def _copy(file: Path, writer: Writer, recovered: Recovered) -> None:
         if isinstance(record, Schema):
             schemas[record.id] = record
         elif isinstance(record, Channel) and record.id not in connections:
-            connections[record.id] = _connect(record, schemas[record.schema_id], writer)
-        elif isinstance(record, Message):
+            try:
+                connections[record.id] = _connect(record, schemas[record.schema_id], writer)
+            except (KeyError, TypeError, ValueError, ReaderError, TypesysError, WriterError):
+                recovered.left_out.add(record.topic)
+        elif isinstance(record, Message) and record.channel_id in connections:
             connection = connections[record.channel_id]
             writer.write(connection, record.log_time, record.data)
             recovered.counts[connection.topic] = recovered.counts.get(connection.topic, 0) + 1

@@ -27,7 +27,10 @@ def run(args: argparse.Namespace) -> int:
     print("\n".join(aligned(rows)))
     if recovered.truncated:
         print("the file is damaged or ends within a record; what came after that place is lost")
-    else:
+    if recovered.left_out:
+        topics = ", ".join(sorted(recovered.left_out))
+        print(f"left out, for their messages are defined in no form of ROS 2 or the definition is damaged: {topics}")
+    if not recovered.truncated and not recovered.left_out:
         print("nothing is lost")
     print(f"bag {recovered.path}, up to {recovered.end_ns * 1e-9:g} s")
     return 0

@@ -14,7 +14,7 @@ from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from limb_nodes.bags import files
 from limb_nodes.bags.read import BagReader
-from limb_nodes.bags.types import make_message
+from limb_nodes.bags.types import limb_typestore, make_message
 from limb_nodes.errors import UserError
 from tests.bags import foreign
 from tests.bags.foreign import MCAP, SQLITE, SUFFIX
@@ -223,3 +223,44 @@ def test_what_unpacks_to_far_more_than_it_takes_is_refused(tmp_path: Path, monke
     message = make_message("limb_msgs/msg/MuscleActivation", 0, name=["a"], activation=np.zeros(2**16))
     many = foreign.write_mcap(tmp_path / "e.mcap", "/emg", [(k, message) for k in range(9)], CompressionType.ZSTD)
     assert "topic /emg takes more than 1048576 bytes unpacked" in refusal(many)
+
+
+def test_a_bag_of_ros_1_and_other_forms_of_messages(tmp_path: Path) -> None:
+    from mcap.writer import Writer
+
+    (tmp_path / "old.bag").write_bytes(b"#ROSBAG V2.0\n" + b"\0" * 100)
+    assert "is a bag of ROS 1; `rosbags-convert --src " in refusal(tmp_path / "old.bag")
+    with (tmp_path / "a.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("Sample", "jsonschema", b"{}")
+        writer.add_message(writer.register_channel("/emg", "json", schema), 5, b"{}", 5)
+        writer.finish()
+    assert "messages are defined in the unknown form 'jsonschema'; ros2msg, ros2idl or omgidl is" in refusal(
+        tmp_path / "a.mcap"
+    )
+
+
+def test_messages_of_the_other_byte_order(tmp_path: Path) -> None:
+    from rosbags.rosbag2 import Writer
+
+    store = limb_typestore()
+    with Writer(tmp_path / "a", version=9) as writer:
+        connection = writer.add_connection("/emg", "limb_msgs/msg/MuscleActivation", typestore=store)
+        for time, message in rows():
+            data = store.serialize_cdr(message, message.__msgtype__, little_endian=False)
+            writer.write(connection, time, data)
+    check(tmp_path / "a")
+    with BagReader(tmp_path / "a") as bag:
+        assert bag.kinds("emg") == {
+            "header.stamp": "time",
+            "header.frame_id": "string",
+            "tick": "uint64",
+            "last_tick": "int64",
+            "name": "string[]",
+            "activation": "float64[]",
+        }
+        _, (block,) = bag.blocks("emg", ["header.stamp", "name", "activation", "last_tick"])
+    assert block.numbers["header.stamp"].tolist() == [k * PERIOD for k in range(COUNT)]
+    assert block.texts == {"name": ("a", "b")}
+    np.testing.assert_array_equal(block.numbers["activation"], np.random.default_rng(3).normal(size=(COUNT, 2)))

@@ -12,6 +12,7 @@ import pytest
 from mcap.exceptions import McapError
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
+from mcap.writer import Writer
 from rosbags.rosbag2 import Reader
 
 from limb_nodes.bags.read import BagReader
@@ -156,6 +157,30 @@ def test_a_whole_bag_is_copied(tmp_path: Path) -> None:
     with Reader(tmp_path / "whole") as plain, Reader(tmp_path / "out") as plain_copy:
         assert [c.ext for c in plain.connections] == [c.ext for c in plain_copy.connections]
         assert [c.digest for c in plain.connections] == [c.digest for c in plain_copy.connections]
+
+
+def test_topics_that_are_not_of_ros_2_are_left_out(tmp_path: Path) -> None:
+    with (tmp_path / "a.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="")
+        text = limb_typestore().generate_msgdef("std_msgs/msg/String", ros_version=2)[0].encode()
+        schemas = (
+            writer.register_schema("std_msgs/msg/String", "ros2msg", text),
+            writer.register_schema("lab.Sample", "protobuf", b"\xff\xfe\0"),
+            writer.register_schema("std_msgs/msg/Bool", "ros2msg", b"bool ["),
+        )
+        string = bytes(
+            limb_typestore().serialize_cdr(make_message("std_msgs/msg/String", data="a"), "std_msgs/msg/String")
+        )
+        for topic, schema in zip(("/good", "/proto", "/broken"), schemas, strict=True):
+            writer.add_message(writer.register_channel(topic, "cdr", schema), 5, string, 5)
+        writer.add_message(writer.register_channel("/none", "json", 0), 5, b"{}", 5)
+        writer.finish()
+    result = recover(tmp_path / "a.mcap", tmp_path / "out")
+    assert result.counts == {"/good": 1}
+    assert result.left_out == {"/proto", "/broken", "/none"}
+    with BagReader(tmp_path / "out") as bag:
+        assert bag.table("good")["data"].tolist() == "a"
 
 
 def test_nothing_is_written_if_there_is_nothing_to_recover(tmp_path: Path) -> None:
