@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.signals import envelope as steps
 from limb_nodes.signals import units
+from limb_nodes.signals.causal import CausalChain, naming
 from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
 from limb_nodes.signals.recording import Recording
 
@@ -36,6 +36,8 @@ class EnvelopeOptions:
     resample: rate of the result (Hz); None keeps the recording's.
     maximum: the envelope that counts as 1, by the channel's name in the recording and in its unit; a
         channel that is not named takes the largest value of its own envelope.
+    mains: frequency of the mains (Hz), 50 or 60, that a notch removes with its harmonics.
+    causal: filter forward only, as live use does.
     channels: the channels to take, each with its new name; empty takes every EMG channel as it is.
     angles: the same for the columns in degrees or radians.
     skip: channels to leave out.
@@ -52,6 +54,8 @@ class EnvelopeOptions:
     channels: Mapping[str, str] = field(default_factory=dict)
     angles: Mapping[str, str] = field(default_factory=dict)
     skip: Sequence[str] = ()
+    mains: float | None = None
+    causal: bool = False
 
     def as_mapping(self) -> dict[str, object]:
         """The options as plain lists, numbers and mappings, for a bag's run_info."""
@@ -129,7 +133,7 @@ def envelopes(recording: Recording, options: EnvelopeOptions | None = None) -> E
                 "is needed"
             )
     signal = _smoothed(recording, raw, options)
-    with _naming(recording, "rest"):
+    with naming("rest", _of(recording)):
         rest = steps.rest_level(signal, recording.rate, options.rest) if options.rest else np.zeros(len(chosen))
     maximum = np.array([options.maximum.get(column, signal[:, i].max()) for i, (column, _) in enumerate(chosen)])
     for i, (column, _) in enumerate(chosen):
@@ -155,25 +159,26 @@ def envelopes(recording: Recording, options: EnvelopeOptions | None = None) -> E
 
 def _smoothed(recording: Recording, raw: FloatArray, options: EnvelopeOptions) -> FloatArray:
     """Filter, rectify and smooth: [samples, channels], in the recording's units."""
-    signal = raw
+    source, signal = _of(recording), raw
+    if options.causal:
+        return CausalChain(recording.rate, options, raw.shape[1], source).process(raw)
+    if options.mains is not None:
+        with naming("mains", source):
+            signal = steps.notch(signal, recording.rate, options.mains)
     if options.band is not None:
-        with _naming(recording, "band"):
+        with naming("band", source):
             signal = steps.band_pass(signal, recording.rate, options.band, options.band_order)
     if options.rectify:
         signal = steps.rectify(signal)
     if options.low_pass is not None:
-        with _naming(recording, "low_pass"):
+        with naming("low_pass", source):
             signal = steps.low_pass(signal, recording.rate, options.low_pass, options.low_pass_order)
     return signal
 
 
-@contextmanager
-def _naming(recording: Recording, field: str) -> Iterator[None]:
-    """Turn the ValueError of a step into a line that names the recording and the field of the options."""
-    try:
-        yield
-    except ValueError as error:
-        raise FieldError(field, str(error), f"{recording.source} ({recording.rate:g} Hz)") from error
+def _of(recording: Recording) -> str:
+    """How an error about a filter begins."""
+    return f"{recording.source} ({recording.rate:g} Hz)"
 
 
 def _check_names(recording: Recording, options: EnvelopeOptions) -> None:

@@ -9,6 +9,10 @@ The usual chain is band_pass, rectify, low_pass, normalise; the defaults stand w
   Control of Human Movement, 4th ed. 2009, ch. 10: 3 to 6 Hz for movement).
 - order and zero phase: a Butterworth filter of half the order runs forward and backward, its corner
   corrected so that the two passes together lose 3 dB there (Winter, ch. 3).
+- mains: a notch at the frequency of the mains and at each of its multiples below half the rate, with the quality
+  factor 30, so that the widths grow with the frequency, as the drift of a harmonic does.
+
+What works sample by sample is in `limb_nodes.signals.causal`, of the same filters in one pass.
 """
 
 from __future__ import annotations
@@ -18,13 +22,19 @@ from typing import Literal
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, iirnotch, sosfiltfilt, tf2sos
 
 from limb_nodes.foundation.arrays import FloatArray
 
 DEFAULT_BAND = (20.0, 450.0)
 DEFAULT_LOW_PASS = 6.0
 DEFAULT_ORDER = 4
+MAINS = (50.0, 60.0)
+NOTCH_QUALITY = 30.0
+# A notch rings for quality / (pi frequency): so many of these times are put before and after the signal.
+_NOTCH_PADS = 3.0
+
+Kind = Literal["lowpass", "highpass"]
 
 
 @dataclass(frozen=True)
@@ -57,16 +67,45 @@ def bridge_gaps(values: FloatArray) -> tuple[FloatArray, Gaps]:
     return bridged, Gaps(len(lengths), int(lengths.sum()), int(lengths.max()))
 
 
+def notch(values: FloatArray, rate: float, mains: float) -> FloatArray:
+    """Remove the hum of the mains and its harmonics, without phase shift.
+
+    values: [samples, channels], no NaN; rate and mains in Hz. Returns an array of the same shape and unit. Raises
+    ValueError as `notch_sections` does.
+    """
+    pad = min(len(values) - 1, int(np.ceil(_NOTCH_PADS * NOTCH_QUALITY / (np.pi * mains) * rate)))
+    cleaned: FloatArray = sosfiltfilt(notch_sections(rate, mains), values, axis=0, padtype="odd", padlen=pad)
+    return cleaned
+
+
+def notch_sections(rate: float, mains: float) -> FloatArray:
+    """Second-order sections [harmonics, 6] that remove the mains and its multiples below half the rate (Hz).
+
+    Raises ValueError if the mains is no frequency of a grid, or not below half the rate.
+    """
+    if mains not in MAINS:
+        raise ValueError(f"is {mains:g}; 50 or 60 in Hz is needed")
+    if not mains < rate / 2:
+        raise ValueError(f"is {mains:g}; a number < {rate / 2:g} in Hz, half the rate, is needed")
+    harmonics = mains * np.arange(1, np.ceil(rate / 2 / mains))
+    return np.vstack([tf2sos(*iirnotch(frequency, NOTCH_QUALITY, rate)) for frequency in harmonics])
+
+
 def band_pass(values: FloatArray, rate: float, band: tuple[float, float], order: int = DEFAULT_ORDER) -> FloatArray:
     """Keep the frequencies between two edges (Hz), without phase shift.
 
     values: [samples, channels], no NaN; rate in Hz; each edge is a filter of the given (even) order, 3 dB down
     at the edge. Returns an array of the same shape and unit. Raises ValueError as `check_filter` does.
     """
+    check_band(band)
+    return _zero_phase(_zero_phase(values, rate, band[0], order, "highpass"), rate, band[1], order, "lowpass")
+
+
+def check_band(band: tuple[float, float]) -> None:
+    """Raise ValueError if the edges of a band-pass (Hz) do not rise."""
     low, high = band
     if not low < high:
         raise ValueError(f"edges are {low:g} and {high:g}; a lower and then a higher number in Hz are needed")
-    return _zero_phase(_zero_phase(values, rate, low, order, "highpass"), rate, high, order, "lowpass")
 
 
 def rectify(values: FloatArray) -> FloatArray:
@@ -85,17 +124,17 @@ def low_pass(
     return _zero_phase(values, rate, corner, order, "lowpass")
 
 
-def check_filter(samples: int, rate: float, corner: float, order: int) -> None:
+def check_filter(rate: float, corner: float, order: int, samples: int | None = None) -> None:
     """Raise ValueError, of the form `NAME is VALUE; WHAT is needed`, if a filter cannot work on such a signal.
 
-    The corner lies between 0 and half the rate, the order is even and 2 to 12, and the signal lasts one
-    period of the corner frequency at least.
+    The corner lies between 0 and half the rate, the order is even and 2 to 12, and the signal, if it has an end, lasts
+    one period of the corner frequency at least.
     """
     if order < 2 or order > 12 or order % 2:
         raise ValueError(f"order is {order}; an even number from 2 to 12 is needed")
     if not 0 < corner < rate / 2:
         raise ValueError(f"corner is {corner:g}; a number > 0 and < {rate / 2:g} in Hz, half the rate, is needed")
-    if samples < max(2, rate / corner):
+    if samples is not None and samples < max(2, rate / corner):
         raise ValueError(
             f"corner is {corner:g}; {int(np.ceil(rate / corner))} samples, one period of it, are needed, not {samples}"
         )
@@ -146,10 +185,18 @@ def resample(values: FloatArray, rate: float, new_rate: float) -> FloatArray:
     return np.stack([np.interp(new_times, times, values[:, i]) for i in range(values.shape[1])], axis=1)
 
 
-def _zero_phase(
-    values: FloatArray, rate: float, corner: float, order: int, kind: Literal["lowpass", "highpass"]
-) -> FloatArray:
-    check_filter(len(values), rate, corner, order)
+def one_pass(rate: float, corner: float, order: int, kind: Kind) -> FloatArray:
+    """Second-order sections [order / 2, 6] of a Butterworth filter that runs once, 3 dB down at its corner (Hz).
+
+    Raises ValueError as `check_filter` does.
+    """
+    check_filter(rate, corner, order)
+    sections: FloatArray = butter(order, corner, kind, fs=rate, output="sos")
+    return sections
+
+
+def _zero_phase(values: FloatArray, rate: float, corner: float, order: int, kind: Kind) -> FloatArray:
+    check_filter(rate, corner, order, len(values))
     half = order // 2
     # Two passes square the gain: the single pass must have lost only 1.5 dB at the corner. The
     # bilinear transform maps frequency through tan, so the correction is exact there, up to Nyquist.
