@@ -55,6 +55,11 @@ class CausalChain:
 
     def process(self, values: FloatArray) -> FloatArray:
         """The envelopes [samples, channels] of the next samples, values [samples, channels]; the same as by steps."""
+        if self._started.all() and np.isfinite(values).all():
+            # The usual case by far, and the one in which a live source has no time to lose.
+            if len(values):
+                self._last = values[-1].copy()
+            return self._run(values, slice(None), None)
         held, starts = self._held(values)
         result = np.zeros(held.shape)
         rows = np.unique(starts[~self._started & (starts < len(values))])
@@ -62,7 +67,7 @@ class CausalChain:
         for start, end in pairwise(edges.tolist()):
             new = ~self._started & (starts <= start)
             self._started |= new
-            result[start:end, self._started] = self._run(held[start:end], new)
+            result[start:end, self._started] = self._run(held[start:end, self._started], self._started, new)
         return result
 
     def _held(self, values: FloatArray) -> tuple[FloatArray, npt.NDArray[np.intp]]:
@@ -77,12 +82,12 @@ class CausalChain:
             self._last = held[-1].copy()
         return held, starts
 
-    def _run(self, values: FloatArray, new: Mask) -> FloatArray:
-        """Filter the channels that have started; `new` start with the first row."""
-        signal = self._raw.run(values[:, self._started], self._started, new)
+    def _run(self, values: FloatArray, running: Mask | slice, new: Mask | None) -> FloatArray:
+        """Filter values [samples, running channels], of which the new ones start with the first row."""
+        signal = self._raw.run(values, running, new)
         if self._rectify:
             signal = steps.rectify(signal)
-        return self._rectified.run(signal, self._started, new)
+        return self._rectified.run(signal, running, new)
 
 
 class _Filter:
@@ -93,11 +98,11 @@ class _Filter:
         self._steady = sosfilt_zi(sections)[:, :, None] if len(sections) else np.zeros((0, 2, 1))
         self._state = np.zeros((len(sections), 2, channels))
 
-    def run(self, values: FloatArray, running: Mask, new: Mask) -> FloatArray:
+    def run(self, values: FloatArray, running: Mask | slice, new: Mask | None) -> FloatArray:
         """Filter values [samples, running channels]; the new channels start at rest at their first value."""
         if not len(self._sections):
             return values
-        if new.any():
+        if new is not None:
             self._state[:, :, new] = self._steady * values[0, new[running]]
         filtered: FloatArray
         filtered, self._state[:, :, running] = sosfilt(self._sections, values, axis=0, zi=self._state[:, :, running])
