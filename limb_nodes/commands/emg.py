@@ -11,8 +11,10 @@ from limb_nodes.commands.text_options import add_text_options, text_options
 from limb_nodes.errors import FieldError
 from limb_nodes.foundation.text_table import aligned
 from limb_nodes.signals.bag_field import BagOptions
-from limb_nodes.signals.emg import EnvelopeOptions, Envelopes, envelopes, write_envelopes
-from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, Gaps
+from limb_nodes.signals.emg import Envelopes, envelopes
+from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_ORDER, MAINS, Gaps
+from limb_nodes.signals.envelope_bag import write_envelopes
+from limb_nodes.signals.options import DEFAULT_LONGEST_GAP, EnvelopeOptions
 from limb_nodes.signals.recording import read_recording
 
 
@@ -21,8 +23,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "emg",
         help="raw EMG to normalised envelopes in a bag",
-        description="Band-pass, rectify, low-pass and normalise raw EMG; write the envelopes (topic emg_envelope) and "
-        "the angles recorded beside them (topic reference_angle) to a bag.",
+        description="Band-pass, rectify, low-pass and normalise raw EMG; write the envelopes (topic emg_envelope), "
+        "the raw EMG (topic emg_raw) and the angles recorded beside them (topic reference_angle) to a bag.",
     )
     parser.add_argument("file", help="text with named columns, such as CSV, or a bag")
     parser.add_argument("-o", "--out", required=True, metavar="BAG", help="folder to write; must not exist")
@@ -52,6 +54,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_text_options(parser)
     add_bag_options(parser)
     steps = parser.add_argument_group("steps")
+    steps.add_argument(
+        "--remove-spikes", action="store_true", help="put straight lines for lone spikes (default: they are noted)"
+    )
+    steps.add_argument(
+        "--longest-gap", type=float, default=DEFAULT_LONGEST_GAP, metavar="S",
+        help=f"put straight lines for values that are missing for S seconds at most (default {DEFAULT_LONGEST_GAP:g})",
+    )  # fmt: skip
+    steps.add_argument("--keep-gaps", action="store_true", help="keep longer gaps as gaps (default: they are refused)")
+    steps.add_argument(
+        "--mains", type=float, metavar="HZ",
+        help=f"notch at the mains, {' or '.join(f'{mains:g}' for mains in MAINS)}, and its harmonics (default: none)",
+    )  # fmt: skip
     band = steps.add_mutually_exclusive_group()
     band.add_argument(
         "--band-pass", dest="band", nargs=2, type=float, default=DEFAULT_BAND, metavar=("LOW", "HIGH"),
@@ -73,6 +87,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help=f"order of both passes together, even (default {DEFAULT_ORDER})",
     )  # fmt: skip
     steps.add_argument(
+        "--causal", action="store_true",
+        help="filter forward only, as live use does; filters of the same orders (default: no phase shift)",
+    )  # fmt: skip
+    steps.add_argument(
         "--rest", type=float, default=0.0, metavar="S",
         help="the mean of each channel's quietest S seconds becomes 0 (default: nothing is subtracted)",
     )  # fmt: skip
@@ -80,6 +98,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--maximum", action="append", default=[], metavar="COLUMN=VALUE",
         help="envelope that becomes 1, in the column's unit; repeatable (default: the channel's own maximum)",
     )  # fmt: skip
+    steps.add_argument(
+        "--maximum-from", nargs="+", action="extend", default=[], metavar="FILE",
+        help="recordings such as maximal contractions, read and processed alike; a channel's largest envelope in them "
+        "becomes 1",
+    )  # fmt: skip
+    steps.add_argument(
+        "--trust", action="append", default=[], metavar="COLUMN",
+        help="normalise this channel although it seems to hold no signal; repeatable (default: it is left at 0)",
+    )  # fmt: skip
+    steps.add_argument(
+        "--delay", type=float, default=0.0, metavar="S",
+        help="shift the envelopes later by the electromechanical delay, often 0.03 to 0.1 (default 0)",
+    )  # fmt: skip
+    parser.add_argument("--no-raw", action="store_true", help="leave the raw EMG (topic emg_raw) out of the bag")
     steps.add_argument("--resample", type=float, metavar="HZ", help="rate of the bag (default: the recording's)")
 
 
@@ -117,11 +149,9 @@ def run(args: argparse.Namespace) -> int:
     bag = bag_options(args)
     for name in bag.names:
         channels.setdefault(name, name)
-    recording = read_recording(
-        args.file,
-        rate=args.rate,
-        text=text_options(args, [*channels, *angles]),
-        bag=bag,
+    text = text_options(args, [*channels, *angles])
+    recording, *maxima = (
+        read_recording(file, rate=args.rate, text=text, bag=bag) for file in (args.file, *args.maximum_from)
     )
     options = EnvelopeOptions(
         band=None if args.no_band_pass else (args.band[0], args.band[1]),
@@ -135,9 +165,16 @@ def run(args: argparse.Namespace) -> int:
         channels=channels,
         angles=angles,
         skip=tuple(name for name in args.skip if name not in recording.skipped),
+        mains=args.mains,
+        causal=args.causal,
+        delay=args.delay,
+        trust=tuple(args.trust),
+        remove_spikes=args.remove_spikes,
+        longest_gap=args.longest_gap,
+        keep_gaps=args.keep_gaps,
     )
-    result = envelopes(recording, options)
-    write_envelopes(result, args.out, options)
+    result = envelopes(recording, options, maxima)
+    write_envelopes(result, args.out, options, raw=not args.no_raw)
     print(summary(result, args.out))
     return 0
 
@@ -150,7 +187,8 @@ def summary(result: Envelopes, out: str) -> str:
         unit = f" {channel.unit}" if channel.unit else ""
         rows.append(
             (channel.column, channel.name, samples, _gaps(channel.gaps), _longest(channel.gaps),
-             f"{channel.maximum:.4g}{unit}", f"{channel.rest:.3g}{unit}", str(channel.clipped))
+             f"{channel.maximum:.4g}{unit}" if channel.has_signal else "no signal", f"{channel.rest:.3g}{unit}",
+             str(channel.clipped))
         )  # fmt: skip
     for angle in result.angle_channels:
         rows.append(

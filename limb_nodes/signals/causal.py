@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -18,9 +17,7 @@ from scipy.signal import sosfilt, sosfilt_zi
 from limb_nodes.errors import FieldError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.signals import envelope as steps
-
-if TYPE_CHECKING:
-    from limb_nodes.signals.emg import EnvelopeOptions
+from limb_nodes.signals.options import EnvelopeOptions
 
 Mask = npt.NDArray[np.bool_]
 

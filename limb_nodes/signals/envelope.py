@@ -21,10 +21,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, iirnotch, sosfiltfilt, tf2sos
 
-from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.arrays import FloatArray, IntArray
 
 DEFAULT_BAND = (20.0, 450.0)
 DEFAULT_LOW_PASS = 6.0
@@ -60,11 +61,16 @@ def bridge_gaps(values: FloatArray) -> tuple[FloatArray, Gaps]:
         raise ValueError("no sample is finite; at least one is needed")
     if not missing.any():
         return values.copy(), Gaps(0, 0, 0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
-    lengths = edges[1::2] - edges[::2]
+    lengths = np.diff(runs(missing))
     samples = np.arange(len(values))
     bridged = np.interp(samples, samples[~missing], values[~missing])
     return bridged, Gaps(len(lengths), int(lengths.sum()), int(lengths.max()))
+
+
+def runs(mask: npt.NDArray[np.bool_]) -> IntArray:
+    """Where a mask [samples] is true without a break: [runs, 2], the first sample of each run and the one after it."""
+    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
+    return edges.reshape(-1, 2).astype(np.int64)
 
 
 def notch(values: FloatArray, rate: float, mains: float) -> FloatArray:
@@ -143,15 +149,24 @@ def check_filter(rate: float, corner: float, order: int, samples: int | None = N
 def rest_level(envelope: FloatArray, rate: float, seconds: float) -> FloatArray:
     """The lowest mean over any stretch of the given length: [channels], in the envelope's unit.
 
-    envelope: [samples, channels]. Raises ValueError if the stretch is longer than the envelope.
+    envelope: [samples, channels], NaN in gaps. Raises ValueError if the stretch is longer than any between gaps.
     """
     window = max(1, round(seconds * rate))
-    if window > len(envelope):
-        raise ValueError(f"is {seconds:g}; a number <= {len(envelope) / rate:g} in s, the whole recording, is needed")
-    means = uniform_filter1d(envelope, window, axis=0)
-    whole = slice(window // 2, len(envelope) - (window - 1) // 2)
-    lowest: FloatArray = means[whole].min(axis=0)
-    return lowest
+    return np.array([_lowest_mean(column, rate, window, seconds) for column in envelope.T])
+
+
+def _lowest_mean(column: FloatArray, rate: float, window: int, seconds: float) -> float:
+    stretches = [column[start:end] for start, end in runs(np.isfinite(column))]
+    longest = max(map(len, stretches), default=0)
+    if window > longest:
+        whole = "the whole recording" if longest == len(column) else "the longest stretch without a gap"
+        raise ValueError(f"is {seconds:g}; a number <= {longest / rate:g} in s, {whole}, is needed")
+    valid = [
+        uniform_filter1d(stretch, window)[window // 2 : len(stretch) - (window - 1) // 2]
+        for stretch in stretches
+        if len(stretch) >= window
+    ]
+    return float(min(means.min() for means in valid))
 
 
 def normalise(
@@ -171,17 +186,18 @@ def normalise(
     return np.clip(scaled, 0.0, 1.0), [int(n) for n in above]
 
 
-def resample(values: FloatArray, rate: float, new_rate: float) -> FloatArray:
+def resample(values: FloatArray, rate: float, new_rate: float, delay: float = 0.0) -> FloatArray:
     """Take a signal at another rate, by straight lines between its samples.
 
-    values: [samples, channels] at `rate` (Hz). Returns [new samples, channels] at `new_rate`, from the same first
-    instant to the last that the signal covers. Raises ValueError if the new rate is not above 0.
+    values: [samples, channels] at `rate` (Hz). delay: time (s) by which the result comes later; it begins with the
+    first values, held. Returns [new samples, channels] at `new_rate`, from the same first instant to the last that the
+    signal covers. Raises ValueError if the new rate is not above 0.
     """
     if not new_rate > 0:
         raise ValueError(f"is {new_rate:g}; a number > 0 in Hz is needed")
     times = np.arange(len(values)) / rate
     count = int(np.floor(times[-1] * new_rate + 1e-9)) + 1
-    new_times = np.arange(count) / new_rate
+    new_times = np.arange(count) / new_rate - delay
     return np.stack([np.interp(new_times, times, values[:, i]) for i in range(values.shape[1])], axis=1)
 
 

@@ -11,7 +11,9 @@ from limb_nodes.bags.types import limb_typestore, make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.topics import TOPIC_TYPES
-from limb_nodes.signals.emg import EnvelopeOptions, envelopes, write_envelopes
+from limb_nodes.signals.emg import envelopes
+from limb_nodes.signals.envelope_bag import write_envelopes
+from limb_nodes.signals.options import EnvelopeOptions
 from limb_nodes.signals.recording import Recording
 
 SAMPLES = 2000
@@ -148,7 +150,7 @@ def test_gaps_are_counted_per_channel_and_hardly_matter():
             {},
             "band corner is 20; 50 samples, one period of it,",
         ),
-        ({"values": np.full((500, 4), np.nan)}, {}, "channel RF holds no value; at least one is needed"),
+        ({"values": np.full((500, 4), np.nan)}, {}, "channel RF holds no value; a channel with a signal is needed"),
         ({"values": np.ones((500, 4))}, {}, "channel RF is 1 everywhere"),
     ],
 )
@@ -254,7 +256,7 @@ def test_existing_output_is_refused_and_kept(raw_file, tmp_path, capsys):
 
 
 def test_bag_without_the_topic_says_what_there_is(raw_file, tmp_path, capsys):
-    limb_emg(raw_file, "-o", tmp_path / "env", "--rate", 1000)
+    limb_emg(raw_file, "-o", tmp_path / "env", "--rate", 1000, "--no-raw")
     line = refusal(capsys, tmp_path / "env", "-o", tmp_path / "again")
     assert (
         "no message on emg_raw; one of /emg_envelope (field activation), /reference_angle (field position) is" in line

@@ -17,7 +17,7 @@ from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.model import Limb, parse_limb
-from limb_nodes.signals.emg import ANGLE_TOPIC, ENVELOPE_TOPIC
+from limb_nodes.signals.envelope_bag import ANGLE_TOPIC, ENVELOPE_TOPIC
 
 DRAWN = ("activation", ENVELOPE_TOPIC, "motor_unit_state", "muscle_state", "joint_torque", "joint_states", ANGLE_TOPIC)
 MUSCLE_FIELDS = (

@@ -1,0 +1,232 @@
+"""What a raw channel holds that is no EMG: lone spikes, clipping, stretches that stand still, no signal at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from shlex import quote
+
+import numpy as np
+import numpy.typing as npt
+
+from limb_nodes.foundation.arrays import FloatArray, IntArray
+from limb_nodes.signals.envelope import runs
+
+# A spike is back within this time (s), shorter than any wave of surface EMG, and this many times as high as all others.
+SPIKE_WIDTH = 0.002
+SPIKE_RATIO = 3.0
+MOST_SPIKES = 20
+# Samples that lie this close to the highest, as a part of the range, count as equal to it: some steps of a converter.
+EQUAL = 2e-4
+CLIPPED_RUNS = 3
+# Noise moves a sensor that works within this time (s) and these samples.
+STILL_TIME, STILL_SAMPLES = 0.1, 20
+# An input without a sensor changes by a step or two of the converter.
+LEVELS_WITHOUT_SIGNAL = 4
+LEAST_SAMPLES = 50
+NO_VALUE = "holds no value"
+
+
+@dataclass(frozen=True)
+class Artefact:
+    """One thing that was noticed in a channel.
+
+    column: the channel's name in the recording. kind: spike, clipping, still or no signal. start, end: s, from the
+    first sample to the last that it touches. samples: how many it takes. value: in the channel's unit. note: a sentence
+    that says what to do.
+    """
+
+    column: str
+    kind: str
+    start: float
+    end: float
+    samples: int
+    value: float
+    note: str
+
+
+def artefacts(column: str, unit: str, values: FloatArray, rate: float, removed: bool = False) -> list[Artefact]:
+    """What was noticed in a channel that holds a signal.
+
+    values: [samples], in its unit, NaN where one is missing; rate: Hz. removed: whether spikes are removed.
+    """
+    spiky, ratio = lone_spikes(values, rate)
+    remedy = "replaced by a straight line" if removed else "--remove-spikes puts a straight line there"
+    found = []
+    for start, end in spiky.tolist():
+        stretch = values[start:end]
+        value = float(stretch[np.nanargmax(np.abs(stretch - np.nanmedian(values)))])
+        found.append(
+            _spike(column, unit, value, (start, end), rate, f"{ratio:.3g} times the highest wave beside it; {remedy}")
+        )
+    rest = np.where(within(len(values), spiky), np.nan, values)
+    clipped = clipped_runs(rest)
+    for level, stretches in clipped:
+        found.append(_clipping(column, unit, level, stretches, rate))
+    at_limits = within(len(values), np.vstack([np.empty((0, 2), np.int64), *(stretches for _, stretches in clipped)]))
+    for start, end in still_runs(rest, rate).tolist():
+        if not at_limits[start]:
+            found.append(_still(column, unit, float(values[start]), (start, end), rate))
+    return found
+
+
+def no_signal(values: FloatArray, rate: float) -> str:
+    """Why a channel seems to hold no signal, as the predicate of a sentence; empty if it holds one.
+
+    values: [samples], NaN where one is missing.
+    """
+    good = values[np.isfinite(values)]
+    if not good.size:
+        return NO_VALUE
+    if np.ptp(good) <= 1e-9 * np.abs(good).max():
+        return f"is {good[0]:g} everywhere"
+    spiky, _ = lone_spikes(values, rate)
+    if len(spiky):
+        good = values[np.isfinite(values) & ~within(len(values), spiky)]
+    if len(good) < LEAST_SAMPLES:
+        return ""
+    if np.ptp(good) == 0.0:
+        return f"is {good[0]:g} everywhere but in a spike"
+    levels = _levels(good)
+    if levels > LEVELS_WITHOUT_SIGNAL:
+        return ""
+    return f"takes {levels} different values only, from {good.min():g} to {good.max():g}, as an unplugged input does"
+
+
+def lone_spikes(values: FloatArray, rate: float) -> tuple[IntArray, float]:
+    """Samples that stand alone far above or below all others.
+
+    values: [samples], NaN where one is missing; rate: Hz. Returns [spikes, 2], the first sample of each and the one
+    after it, and how many times higher the lowest of them is than the highest wave beside them.
+
+    A sample is as prominent as it is from the nearer of the values one width before and after it. Spikes are the few
+    most prominent ones, if the next one is so much less prominent.
+    """
+    none: tuple[IntArray, float] = (np.empty((0, 2), dtype=np.int64), 0.0)
+    width = max(1, round(SPIKE_WIDTH * rate))
+    good = np.isfinite(values)
+    if good.sum() < LEAST_SAMPLES:
+        return none
+    held = values if good.all() else np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
+    padded = np.pad(held, width, mode="reflect") if len(held) > width else np.pad(held, width, mode="edge")
+    before, after = padded[: -2 * width], padded[2 * width :]
+    prominence = np.maximum(np.minimum(held - before, held - after), np.minimum(before - held, after - held))
+    places, heights = _peaks(prominence, width)
+    ratios = heights[:-1] / np.maximum(heights[1:], np.finfo(float).tiny)
+    count = int(ratios[:MOST_SPIKES].argmax()) + 1 if len(ratios) else 0
+    if not count or ratios[count - 1] < SPIKE_RATIO:
+        return none
+    spikes = [_extent(held, place, width) for place in np.sort(places[:count])]
+    # A wave that is broad does not fall back to where it came from within the width.
+    sharp = [_is_sharp(held, prominence[place], place, width) for place in np.sort(places[:count])]
+    kept = [spike for spike, is_sharp in zip(spikes, sharp, strict=True) if is_sharp]
+    return (np.array(kept, dtype=np.int64), float(min(ratios[count - 1], 1e6))) if kept else none
+
+
+def clipped_runs(values: FloatArray) -> list[tuple[float, IntArray]]:
+    """The levels at which a channel is cut off, each with its runs [runs, 2] of samples.
+
+    A limit is where samples pile up: several times two or more in a row, and more in all than in the hundredth of the
+    range below it. values: [samples], NaN where one is missing.
+    """
+    found = []
+    good = np.isfinite(values)
+    if good.sum() < LEAST_SAMPLES:
+        return []
+    span = float(np.ptp(values[good]))
+    for sign in (1.0, -1.0):
+        signed = np.where(good, sign * values, -np.inf)
+        top = float(signed.max())
+        at_top = signed >= top - EQUAL * span
+        stretches = runs(at_top)
+        long = stretches[np.diff(stretches)[:, 0] >= 2]
+        below = signed[~at_top].max(initial=-np.inf)
+        near = int(((signed >= min(top - 0.01 * span, below)) & ~at_top).sum())
+        if len(long) >= CLIPPED_RUNS and at_top.sum() > near:
+            found.append((sign * top, stretches))
+    return found
+
+
+def still_runs(values: FloatArray, rate: float) -> IntArray:
+    """Where a channel keeps one value longer than noise would let it: [runs, 2]. values: [samples]; rate: Hz."""
+    same = np.diff(values) == 0.0
+    stretches = runs(same)
+    stretches[:, 1] += 1
+    return stretches[np.diff(stretches)[:, 0] >= max(STILL_SAMPLES, STILL_TIME * rate)]
+
+
+def _peaks(prominence: FloatArray, width: int) -> tuple[IntArray, FloatArray]:
+    """Place and height of the most prominent samples, no two of one wave, the highest first."""
+    count = min(len(prominence), 200 + 64 * width)
+    candidates = np.argpartition(prominence, -count)[-count:]
+    candidates = candidates[np.argsort(-prominence[candidates], kind="stable")]
+    places: list[int] = []
+    for candidate in candidates.tolist():
+        if all(abs(candidate - place) > 2 * width for place in places):
+            places.append(candidate)
+        if len(places) > MOST_SPIKES:
+            break
+    return np.array(places, dtype=np.int64), prominence[places]
+
+
+def _extent(values: FloatArray, place: int, width: int) -> tuple[int, int]:
+    """The samples around a spike's peak that lie off the level beside it by a tenth of its height."""
+    level = _level(values, place, width)
+    off = np.abs(values - level)[max(0, place - width) : place + width + 1] > 0.1 * abs(values[place] - level)
+    start = place - max(0, place - width)
+    first = start - int((~off[start::-1]).argmax() if not off[start::-1].all() else start + 1) + 1
+    last = start + int((~off[start:]).argmax() if not off[start:].all() else len(off) - start)
+    return place - start + first, place - start + last
+
+
+def _is_sharp(values: FloatArray, prominence: float, place: int, width: int) -> bool:
+    return bool(prominence > 0.5 * abs(values[place] - _level(values, place, width)))
+
+
+def _level(values: FloatArray, place: int, width: int) -> float:
+    return float(np.median(values[max(0, place - 10 * width) : place + 10 * width + 1]))
+
+
+def _levels(values: FloatArray) -> int:
+    """How many different values there are, some more than a few counting as many."""
+    scale = float(np.ptp(values))
+    few = np.unique(np.round((values[:1000] - values.min()) / scale, 9))
+    return (
+        len(few) if len(few) > LEVELS_WITHOUT_SIGNAL else len(np.unique(np.round((values - values.min()) / scale, 9)))
+    )
+
+
+def within(size: int, stretches: IntArray) -> npt.NDArray[np.bool_]:
+    """A mask [size] that is true within some runs [runs, 2] of samples."""
+    steps = np.zeros(size + 1, dtype=np.int64)
+    np.add.at(steps, stretches[:, 0], 1)
+    np.add.at(steps, stretches[:, 1], -1)
+    return np.cumsum(steps[:-1]) > 0
+
+
+def _spike(column: str, unit: str, value: float, stretch: tuple[int, int], rate: float, about: str) -> Artefact:
+    first, last = stretch[0] / rate, (stretch[1] - 1) / rate
+    note = f"channel {column}: a lone spike of {_quantity(value, unit)} at {first:.6g} s, {about}"
+    return Artefact(column, "spike", first, last, stretch[1] - stretch[0], value, note)
+
+
+def _clipping(column: str, unit: str, level: float, stretches: IntArray, rate: float) -> Artefact:
+    samples = int(np.diff(stretches).sum())
+    first, last = float(stretches[0, 0] / rate), float((stretches[-1, 1] - 1) / rate)
+    note = (
+        f"channel {column}: clipped at {_quantity(level, unit)}, {samples} samples from {first:.6g} to {last:.6g} s; "
+        f"its envelope is too low there: record with less gain, or leave it out by --skip {quote(column)}"
+    )
+    return Artefact(column, "clipping", first, last, samples, level, note)
+
+
+def _still(column: str, unit: str, level: float, stretch: tuple[int, int], rate: float) -> Artefact:
+    first, last = stretch[0] / rate, (stretch[1] - 1) / rate
+    note = (
+        f"channel {column}: stands still at {_quantity(level, unit)} from {first:.6g} to {last:.6g} s; "
+        f"check its contact, or leave it out by --skip {quote(column)}"
+    )
+    return Artefact(column, "still", first, last, stretch[1] - stretch[0], level, note)
+
+
+def _quantity(value: float, unit: str) -> str:
+    return f"{value:.6g} {unit}".strip()
