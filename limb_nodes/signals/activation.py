@@ -22,6 +22,10 @@ from limb_nodes.signals.waveform import Waveform, parse_constants, read_waveform
 # A recorded run holds what drove its muscles on the first topic, a recording of EMG on the second.
 ACTIVATION_TOPICS = ("activation", "emg_envelope")
 MOST_TICKS = 10**8
+# Filters and conversions of units leave values outside [0, 1] by as much as this.
+ROUNDING = 1e-6
+# An envelope that exceeds its maximum seldom exceeds it twice; one in percent does.
+LEAST_PERCENT = 2.0
 RATE = Parameter("rate", "Hz", "ticks per second", above=0.0)
 DURATION = Parameter("duration", "s", "simulated time", above=0.0)
 
@@ -131,13 +135,7 @@ def _from_samples(samples: _Samples, muscles: Sequence[str], rate: float, durati
     source, times = samples.source, samples.times - samples.times[0]
     _check_muscles(source, "column", samples.names, muscles)
     values = samples.values[:, [samples.names.index(muscle) for muscle in muscles]]
-    outside = np.argwhere(~((values >= 0.0) & (values <= 1.0)))
-    if outside.size:
-        row, column = outside[0]
-        raise UserError(
-            f"{source}, {samples.place(row)}: {muscles[column]} {is_value(values[row, column])}; "
-            "a number in [0, 1] is needed"
-        )
+    values, rounded = _checked(samples, values, muscles)
     end = float(times[-1])
     if duration is None:
         _check_count(end, rate)
@@ -153,7 +151,26 @@ def _from_samples(samples: _Samples, muscles: Sequence[str], rate: float, durati
         sampled = values[: last + 1].copy()
     else:
         sampled = np.stack([np.interp(ticks, times, values[:, i]) for i in range(len(muscles))], axis=1)
-    return Activation(sampled, rate, tuple(muscles), samples.notes + _unused(samples.names, muscles))
+    return Activation(sampled, rate, tuple(muscles), samples.notes + rounded + _unused(samples.names, muscles))
+
+
+def _checked(samples: _Samples, values: FloatArray, muscles: Sequence[str]) -> tuple[FloatArray, tuple[str, ...]]:
+    """The values [samples, muscles] within [0, 1], and a note if rounding had put some outside.
+
+    Raises UserError that names the first value that is missing or further outside.
+    """
+    outside = np.argwhere(~((values >= -ROUNDING) & (values <= 1.0 + ROUNDING)))
+    if outside.size:
+        row, column = outside[0]
+        value, highest = values[row, column], float(np.nanmax(values[:, column]))
+        percent = f"; it reaches {highest:.6g}: divide it by 100 if it is in percent" if highest > LEAST_PERCENT else ""
+        raise UserError(
+            f"{samples.source}, {samples.place(row)}: {muscles[column]} {is_value(value)}; "
+            f"a number in [0, 1] is needed{percent}"
+        )
+    clipped = np.clip(values, 0.0, 1.0)
+    count = int((clipped != values).sum())
+    return clipped, (f"values outside [0, 1] by rounding, by {ROUNDING:g} at most, clipped: {count}",) if count else ()
 
 
 def _check_muscles(source: str, what: str, names: Sequence[str], muscles: Sequence[str]) -> None:

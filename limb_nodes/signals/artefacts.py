@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from shlex import quote
 
 import numpy as np
@@ -32,7 +32,7 @@ class Artefact:
 
     column: the channel's name in the recording. kind: spike, clipping, still or no signal. start, end: s, from the
     first sample to the last that it touches. samples: how many it takes. value: in the channel's unit. note: a sentence
-    that says what to do.
+    that says what to do, about all of the kind; empty but for the first of them.
     """
 
     column: str
@@ -41,7 +41,7 @@ class Artefact:
     end: float
     samples: int
     value: float
-    note: str
+    note: str = ""
 
 
 def artefacts(column: str, unit: str, values: FloatArray, rate: float, removed: bool = False) -> list[Artefact]:
@@ -50,23 +50,19 @@ def artefacts(column: str, unit: str, values: FloatArray, rate: float, removed: 
     values: [samples], in its unit, NaN where one is missing; rate: Hz. removed: whether spikes are removed.
     """
     spiky, ratio = lone_spikes(values, rate)
-    remedy = "replaced by a straight line" if removed else "--remove-spikes puts a straight line there"
-    found = []
-    for start, end in spiky.tolist():
-        stretch = values[start:end]
-        value = float(stretch[np.nanargmax(np.abs(stretch - np.nanmedian(values)))])
-        found.append(
-            _spike(column, unit, value, (start, end), rate, f"{ratio:.3g} times the highest wave beside it; {remedy}")
-        )
+    found = _spikes(column, values, rate, spiky)
+    if found:
+        remedy = "replaced by a straight line" if removed else "--remove-spikes puts a straight line there"
+        times = ", ".join(f"{_quantity(spike.value, unit)} at {spike.start:.6g} s" for spike in found)
+        what = "a lone spike" if len(found) == 1 else f"{len(found)} lone spikes"
+        about = f"{what}, {times}, {ratio:.3g} times the highest wave beside; {remedy}"
+        found[0] = replace(found[0], note=f"channel {column}: {about}")
     rest = np.where(within(len(values), spiky), np.nan, values)
-    clipped = clipped_runs(rest)
-    for level, stretches in clipped:
-        found.append(_clipping(column, unit, level, stretches, rate))
-    at_limits = within(len(values), np.vstack([np.empty((0, 2), np.int64), *(stretches for _, stretches in clipped)]))
-    for start, end in still_runs(rest, rate).tolist():
-        if not at_limits[start]:
-            found.append(_still(column, unit, float(values[start]), (start, end), rate))
-    return found
+    limits = clipped_runs(rest)
+    found += [_clipping(column, unit, level, stretches, rate) for level, stretches in limits]
+    at_limits = within(len(values), np.vstack([np.empty((0, 2), np.int64), *(stretches for _, stretches in limits)]))
+    still = still_runs(rest, rate)
+    return found + _still(column, unit, values, still[~at_limits[still[:, 0]]], rate)
 
 
 def no_signal(values: FloatArray, rate: float) -> str:
@@ -203,10 +199,13 @@ def within(size: int, stretches: IntArray) -> npt.NDArray[np.bool_]:
     return np.cumsum(steps[:-1]) > 0
 
 
-def _spike(column: str, unit: str, value: float, stretch: tuple[int, int], rate: float, about: str) -> Artefact:
-    first, last = stretch[0] / rate, (stretch[1] - 1) / rate
-    note = f"channel {column}: a lone spike of {_quantity(value, unit)} at {first:.6g} s, {about}"
-    return Artefact(column, "spike", first, last, stretch[1] - stretch[0], value, note)
+def _spikes(column: str, values: FloatArray, rate: float, spiky: IntArray) -> list[Artefact]:
+    found = []
+    middle = np.nanmedian(values) if len(spiky) else 0.0
+    for start, end in spiky.tolist():
+        peak = start + int(np.nanargmax(np.abs(values[start:end] - middle)))
+        found.append(Artefact(column, "spike", start / rate, (end - 1) / rate, end - start, float(values[peak])))
+    return found
 
 
 def _clipping(column: str, unit: str, level: float, stretches: IntArray, rate: float) -> Artefact:
@@ -219,13 +218,20 @@ def _clipping(column: str, unit: str, level: float, stretches: IntArray, rate: f
     return Artefact(column, "clipping", first, last, samples, level, note)
 
 
-def _still(column: str, unit: str, level: float, stretch: tuple[int, int], rate: float) -> Artefact:
-    first, last = stretch[0] / rate, (stretch[1] - 1) / rate
-    note = (
-        f"channel {column}: stands still at {_quantity(level, unit)} from {first:.6g} to {last:.6g} s; "
-        f"check its contact, or leave it out by --skip {quote(column)}"
-    )
-    return Artefact(column, "still", first, last, stretch[1] - stretch[0], level, note)
+def _still(column: str, unit: str, values: FloatArray, stretches: IntArray, rate: float) -> list[Artefact]:
+    found = [
+        Artefact(column, "still", start / rate, (end - 1) / rate, end - start, float(values[start]))
+        for start, end in stretches.tolist()
+    ]
+    if found:
+        first, more = found[0], len(found) - 1
+        note = (
+            f"channel {column}: stands still at {_quantity(first.value, unit)} from {first.start:.6g} to "
+            f"{first.end:.6g} s{f' and {more} times more' if more else ''}; check its contact, or leave it out by "
+            f"--skip {quote(column)}"
+        )
+        found[0] = replace(first, note=note)
+    return found
 
 
 def _quantity(value: float, unit: str) -> str:

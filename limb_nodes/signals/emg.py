@@ -110,7 +110,7 @@ def envelopes(
         values = steps.resample(values, recording.rate, rate, options.delay)
     if options.resample is not None:
         angles = steps.resample(angles, recording.rate, rate) if angle_columns else np.empty((len(values), 0))
-    noticed = tuple(artefact.note for artefact in result.artefacts)
+    noticed = tuple(artefact.note for artefact in result.artefacts if artefact.note)
     return Envelopes(
         recording.source,
         rate,

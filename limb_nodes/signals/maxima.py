@@ -20,10 +20,11 @@ def maxima(
 ) -> tuple[dict[str, float], tuple[str, ...]]:
     """The largest envelope of each channel in some recordings, made by the same steps.
 
-    columns: the unit of each channel whose maximum is needed, by its name. Returns the maxima in these units, and notes.
+    columns: the unit of each channel whose maximum is needed, by its name. Returns the maxima in these units, and
+    notes.
 
-    Raises FieldError if no recording has a channel, with a signal and in a unit of the same kind; UserError or FieldError
-    as `smooth` does.
+    Raises FieldError if no recording has a signal of a channel; UserError if a channel is in a unit that cannot be
+    turned into the one that is needed; both as `smooth` does.
     """
     found: dict[str, float] = {}
     places: dict[str, str] = {}
@@ -35,7 +36,7 @@ def maxima(
             continue
         given = replace(options, trust=tuple(set(options.trust) & set(there)), keep_gaps=True)
         result = smooth(recording, there, given)
-        notes += [f"{recording.source}: {artefact.note}" for artefact in result.artefacts]
+        notes += [f"{recording.source}: {artefact.note}" for artefact in result.artefacts if artefact.note]
         for i, column in enumerate(there):
             if not result.has_signal[i]:
                 continue
@@ -50,8 +51,8 @@ def maxima(
         if column not in found:
             raise FieldError(
                 "maximum_from",
-                f"is {', '.join(recording.source for recording in recordings)}, without a signal of channel {column}; a "
-                f"recording with it is needed, or --maximum {quote(column)}=VALUE",
+                f"is {', '.join(recording.source for recording in recordings)}, without a signal of channel {column}; "
+                f"a recording with it is needed, or --maximum {quote(column)}=VALUE",
             )
     return found, (*notes, f"maxima: {', '.join(places.values())}")
 

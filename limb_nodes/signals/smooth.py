@@ -23,9 +23,9 @@ from limb_nodes.signals.recording import Recording
 class Smooth:
     """Some channels of a recording.
 
-    values: [samples, channels], the envelopes in the channels' units; 0 in a channel without a signal, NaN in a gap that
-    is kept. raw: [samples, channels], before all steps, NaN where a value is missing. gaps, has_signal: one per channel.
-    artefacts: what was noticed in them.
+    values: [samples, channels], the envelopes in the channels' units; 0 in a channel without a signal, NaN in a gap
+    that is kept. raw: [samples, channels], before all steps, NaN where a value is missing. gaps, has_signal: one per
+    channel. artefacts: what was noticed in them.
     """
 
     values: FloatArray

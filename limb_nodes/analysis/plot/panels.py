@@ -11,6 +11,7 @@ from limb_nodes.analysis.plot.series import BagSeries, Series
 from limb_nodes.analysis.style import BLACK, COLOURS, PALE, STYLES
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import Limb
+from limb_nodes.signals.envelope import runs
 
 SIMULATED, NET, RECORDED = BLACK, PALE, PALE
 BROAD = 2.8
@@ -47,10 +48,21 @@ class Raster:
 
 
 @dataclass(frozen=True)
+class Mark:
+    """Something noticed: its kind; times in s; a value for a point, None for a stretch."""
+
+    kind: str
+    start: float
+    end: float
+    value: float | None = None
+
+
+@dataclass(frozen=True)
 class Panel:
     """A panel: lines or a raster over time.
 
-    kind: tells what it shows. limits: of the y axis, None for the data's. bounds: the ends of a joint's range.
+    kind: tells what it shows. limits: of the y axis, None for the data's. bounds: the ends of a joint's range. marks:
+    what was noticed there.
     """
 
     kind: str
@@ -61,6 +73,7 @@ class Panel:
     limits: tuple[float, float] | None = None
     bounds: tuple[float, float] | None = None
     legend: bool = False
+    marks: tuple[Mark, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -298,18 +311,60 @@ def _tendon(run: BagSeries, muscles: Sequence[str]) -> Panel | None:
 
 
 def _envelope_columns(run: BagSeries) -> list[Column]:
-    """A panel per channel, for envelopes over each other hide each other; the recorded angles below."""
-    panels = []
+    """A panel per channel, for envelopes over each other hide each other; the recorded angles below.
+
+    The raw EMG, if the bag holds it, is to the left of each envelope.
+    """
+    panels: list[Panel] = []
+    raw: list[Panel | None] = []
     if run.drive is not None:
         for index, name in enumerate(run.drive.names):
             colour, style = look_of(index)
             line = Line(name, run.drive.times, run.drive.column(name), colour, style)
             title = f"EMG envelope {name}" if run.is_envelope else f"Activation {name}"
-            panels.append(Panel("drive", title, "of maximum", (line,), limits=_drive_limits(run.drive)))
+            marks = _stretches(run, name)
+            panels.append(Panel("drive", title, "of maximum", (line,), limits=_drive_limits(run.drive), marks=marks))
+            raw.append(_raw(run, name))
     if run.reference is not None:
         for name in run.reference.names:
             values = np.degrees(run.reference.column(name))
             line = Line(name, run.reference.times, values, SIMULATED)
             panels.append(Panel("angle", f"Recorded angle {name}", "deg", (line,)))
     rows = len(panels) if len(panels) <= MOST_ROWS else -(-len(panels) // 2)
-    return [Column("", (), tuple(panels[i : i + rows])) for i in range(0, len(panels), rows)]
+    columns = []
+    for i in range(0, len(panels), rows):
+        shown = tuple(panels[i : i + rows])
+        beside = (*raw[i : i + rows], *[None] * rows)[: len(shown)]
+        columns += [Column("", (), beside)] if any(beside) else []
+        columns.append(Column("", (), shown))
+    return columns
+
+
+def _raw(run: BagSeries, name: str) -> Panel | None:
+    """The raw EMG of a channel, with what was noticed in it."""
+    if run.raw is None or name not in run.raw.series.names:
+        return None
+    index = run.raw.series.names.index(name)
+    line = Line(name, run.raw.series.times, run.raw.series.values[:, index], RECORDED, width=0.7)
+    points = tuple(
+        Mark(event.kind, event.start, event.end, event.value)
+        for event in run.raw.events
+        if event.name == name and event.kind in ("spike", "clipping")
+    )
+    unit = run.raw.units[index] or "no unit"
+    return Panel("raw", f"Raw EMG {name}", unit, (line,), marks=(*_stretches(run, name), *points))
+
+
+def _stretches(run: BagSeries, name: str) -> tuple[Mark, ...]:
+    """Gaps of a channel, and stretches in which it holds no signal."""
+    if run.raw is None or name not in run.raw.series.names:
+        return ()
+    times = run.raw.series.times
+    missing = runs(np.isnan(run.raw.series.column(name)))
+    # From the last value before a gap to the first one after it.
+    gaps = [(times[max(start - 1, 0)], times[min(end, len(times) - 1)]) for start, end in missing.tolist()]
+    events = [event for event in run.raw.events if event.name == name and event.kind in ("still", "no signal")]
+    return (
+        *(Mark("gap", float(start), float(end)) for start, end in gaps),
+        *(Mark(event.kind, event.start, event.end) for event in events),
+    )

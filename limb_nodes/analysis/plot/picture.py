@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from limb_nodes.analysis.plot.limbs import Posture, draw_gravity, draw_limb, frame, instants, posture
-from limb_nodes.analysis.plot.panels import Column, Panel, Raster, columns_of
+from limb_nodes.analysis.plot.panels import Column, Mark, Panel, Raster, columns_of
 from limb_nodes.analysis.plot.series import BagSeries
 from limb_nodes.analysis.plot.thin import pooled, thinned
-from limb_nodes.analysis.style import GREY, PALE, new_figure, styled
+from limb_nodes.analysis.style import COLOURS, DARK, GREY, PALE, new_figure, styled
 from limb_nodes.model import Limb
 
 if TYPE_CHECKING:
@@ -27,6 +29,16 @@ COLUMN_WIDTH, LEAST_WIDTH, LEAST_STRIP, MOST_STRIP = 5.4, 9.0, 0.7, 3.5
 GRAVITY_WIDTH, LEGEND_GAP = 0.55, 0.3
 LEGEND_COLUMNS = 4
 LARGEST_DPI = 1200
+REMARK_HEIGHT, LETTERS_PER_INCH = 0.16, 16.0
+MOST_REMARKS = 30
+# The colours of what was noticed in raw EMG.
+MARKS = {
+    "gap": COLOURS[5],
+    "spike": COLOURS[1],
+    "clipping": COLOURS[6],
+    "still": COLOURS[3],
+    "no signal": COLOURS[3],
+}
 
 
 @styled
@@ -39,6 +51,7 @@ def picture(run: BagSeries) -> Figure:
         "strip": _strip_height(postures, width),
         "legends": max(_legend_rows(column) for column in columns) * LEGEND_HEIGHT,
         "body": max(len(column.panels) for column in columns) * ROW_HEIGHT,
+        "remarks": len(_lines(run.remarks, width)) * REMARK_HEIGHT,
     }
     figure = new_figure(width, HEAD_HEIGHT + sum(heights.values()))
     heights = {name: height for name, height in heights.items() if height}
@@ -50,11 +63,23 @@ def picture(run: BagSeries) -> Figure:
     if "legends" in parts:
         # Holds the room for the legends, which follow the panels below it.
         figure.add_subplot(parts["legends"], label="room").axis("off")
+    if run.remarks:
+        _draw_remarks(figure, parts["remarks"], run.remarks)
     marks = [shown.time for shown in postures]
-    body = parts["body"].subgridspec(1, len(columns))
-    for index, column in enumerate(columns):
-        _draw_column(figure, body[index], index, column, run, marks)
+    for index, (column, places_of_panels) in enumerate(zip(columns, _grid(parts["body"], columns), strict=True)):
+        _draw_column(figure, places_of_panels, index, column, run, marks)
     return figure
+
+
+def _grid(place: SubplotSpec, columns: Sequence[Column]) -> list[list[SubplotSpec]]:
+    """The places of each column's panels, in common rows if all columns have as many."""
+    counts = [len(column.panels) for column in columns]
+    if len(set(counts)) == 1:
+        whole = place.subgridspec(counts[0], len(columns))
+        return [[whole[row, index] for row in range(counts[0])] for index in range(len(columns))]
+    body = place.subgridspec(1, len(columns))
+    own = [body[index].subgridspec(count, 1) for index, count in enumerate(counts)]
+    return [[grid[row] for row in range(count)] for grid, count in zip(own, counts, strict=True)]
 
 
 def _draw_headings(figure: Figure, run: BagSeries) -> None:
@@ -130,10 +155,24 @@ def _column_legend(axes: Axes, column: Column) -> Legend:
     return legend
 
 
+def _lines(remarks: Sequence[str], width: float) -> list[str]:
+    """Notes in lines as long as a picture is wide (inches)."""
+    letters = int(width * LETTERS_PER_INCH)
+    lines = [line for remark in remarks for line in wrap(f"note: {remark}", letters, subsequent_indent="    ")]
+    return lines if len(lines) <= MOST_REMARKS else [*lines[: MOST_REMARKS - 1], "..."]
+
+
+def _draw_remarks(figure: Figure, place: SubplotSpec, remarks: Sequence[str]) -> None:
+    """What was noticed when the bag was made, below the panels."""
+    axes = figure.add_subplot(place, label="remarks")
+    axes.axis("off")
+    text = "\n".join(_lines(remarks, figure.get_figwidth()))
+    axes.text(0.0, 1.0, text, va="top", fontsize="small", color=DARK, parse_math=False).set_in_layout(False)
+
+
 def _draw_column(
-    figure: Figure, place: SubplotSpec, index: int, column: Column, run: BagSeries, marks: list[float]
+    figure: Figure, grid: list[SubplotSpec], index: int, column: Column, run: BagSeries, marks: list[float]
 ) -> None:
-    grid = place.subgridspec(len(column.panels), 1)
     first: Axes | None = None
     filled = [row for row, panel in enumerate(column.panels) if panel is not None]
     for row, panel in enumerate(column.panels):
@@ -166,6 +205,8 @@ def _draw_panel(axes: Axes, panel: Panel, run: BagSeries) -> None:
     if panel.limits is not None:
         axes.set_ylim(*panel.limits)
     axes.margins(x=0)
+    for mark in panel.marks:
+        _draw_mark(axes, mark)
     if panel.bounds is not None:
         _draw_bounds(axes, panel.bounds)
     handles = [
@@ -179,6 +220,23 @@ def _draw_panel(axes: Axes, panel: Panel, run: BagSeries) -> None:
             borderaxespad=0.1, handlelength=1.6, columnspacing=1.0, fontsize="small",
         )  # fmt: skip
         legend.set_in_layout(False)
+
+
+def _draw_mark(axes: Axes, mark: Mark) -> None:
+    """A gap or a stretch without signal as a band, a spike as a ring, clipping as a line; each with its name."""
+    colour = MARKS[mark.kind]
+    if mark.value is None:
+        axes.axvspan(mark.start, mark.end, color=colour, alpha=0.25, linewidth=0.8, zorder=0.5, gid=mark.kind)
+    elif mark.kind == "spike":
+        axes.plot(mark.start, mark.value, "o", markerfacecolor="none", markeredgecolor=colour, gid=mark.kind)
+    else:
+        axes.hlines(mark.value, mark.start, mark.end, color=colour, linewidth=1.2, zorder=3, gid=mark.kind)
+    if mark.kind not in [text.get_gid() for text in axes.texts]:
+        # Once for each kind, above the panel, from the right.
+        place = 1.0 - 0.16 * len(axes.texts)
+        name = axes.text(place, 1.03, mark.kind, transform=axes.transAxes, ha="right", fontsize="small", color=colour)
+        name.set_gid(mark.kind)
+        name.set_in_layout(False)
 
 
 def _draw_bounds(axes: Axes, bounds: tuple[float, float]) -> None:

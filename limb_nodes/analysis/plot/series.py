@@ -17,7 +17,7 @@ from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.model import Limb, parse_limb
-from limb_nodes.signals.envelope_bag import ANGLE_TOPIC, ENVELOPE_TOPIC
+from limb_nodes.signals.envelope_bag import ANGLE_TOPIC, ENVELOPE_TOPIC, RAW_TOPIC, read_raw
 
 DRAWN = ("activation", ENVELOPE_TOPIC, "motor_unit_state", "muscle_state", "joint_torque", "joint_states", ANGLE_TOPIC)
 MUSCLE_FIELDS = (
@@ -45,11 +45,32 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Event:
+    """Something noticed in a channel: its new name, the kind of the artefact, times in s, the value in its unit."""
+
+    name: str
+    kind: str
+    start: float
+    end: float
+    value: float
+
+
+@dataclass(frozen=True)
+class RawEmg:
+    """The raw EMG of a bag of envelopes: the channels under their new names, each in its unit, and what was noticed."""
+
+    series: Series
+    units: tuple[str, ...]
+    events: tuple[Event, ...]
+
+
+@dataclass(frozen=True)
 class BagSeries:
     """What a bag holds. A series is None, or missing in `muscles`, if the bag lacks its topic.
 
     limb: None in a bag without one, such as an envelope bag. drive: activations, or the envelopes of a bag without
     activations (`is_envelope`). owners: the muscle of each motor unit of `frequency`. muscles: by field of MuscleState.
+    raw: what the envelopes were made of. remarks: what was noticed when they were made, one sentence each.
     angle, velocity, torque: by joint, rad, rad/s, N m. reference: recorded angles by joint, rad. start, end: s.
     source: what the bag was made of, if it holds no limb. notes: what a person should know, one sentence each.
     """
@@ -62,6 +83,8 @@ class BagSeries:
     end: float
     drive: Series | None = None
     is_envelope: bool = False
+    raw: RawEmg | None = None
+    remarks: tuple[str, ...] = ()
     frequency: Series | None = None
     owners: tuple[str, ...] = ()
     muscles: dict[str, Series] = field(default_factory=dict)
@@ -147,7 +170,13 @@ def read_series(
         bag = _Bag(reader, namespace, start, end)
         info = bag.info()
         limb, notes = _limb(info, str(path))
-        parts = {**_read_drive(bag), **_read_units(bag), **_read_muscles(bag), **_read_joints(bag)}
+        parts = {
+            **_read_drive(bag),
+            **_read_units(bag),
+            **_read_muscles(bag),
+            **_read_joints(bag),
+            **_read_raw(bag, info),
+        }
         if reference is None and bag.has(ANGLE_TOPIC):
             table = bag.table(ANGLE_TOPIC)
             parts["reference"] = bag.cut(ANGLE_TOPIC, table, _names(table["name"]), "position")
@@ -239,6 +268,25 @@ def _read_drive(bag: _Bag) -> dict[str, Any]:
     table = bag.table(topic)
     drive = bag.cut(topic, table, _names(table["name"]), "activation")
     return {"drive": drive, "is_envelope": topic == ENVELOPE_TOPIC}
+
+
+def _read_raw(bag: _Bag, info: dict[str, Any]) -> dict[str, Any]:
+    """The raw EMG and what was noticed in it, if the bag is of `limb emg` and holds them."""
+    channels, rate = info.get("channels"), info.get("raw_rate")
+    if not isinstance(channels, list) or not isinstance(rate, (int, float)):
+        return {}
+    remarks = tuple(str(note) for note in info.get("notes") or ())
+    if not bag.has(RAW_TOPIC):
+        return {"remarks": remarks}
+    times, values = read_raw(bag.reader, f"{bag.prefix}/{RAW_TOPIC}", float(rate), len(channels))
+    names = {channel["column"]: str(channel["name"]) for channel in channels}
+    events = tuple(
+        Event(names[one["column"]], one["kind"], one["start"], one["end"], one["value"])
+        for one in info.get("artefacts") or ()
+    )
+    series = bag.cut(RAW_TOPIC, {"time": times, "raw": values}, tuple(names.values()), "raw")
+    units = tuple(str(channel["unit"]) for channel in channels)
+    return {"remarks": remarks, "raw": RawEmg(series, units, events)}
 
 
 def _read_units(bag: _Bag) -> dict[str, Any]:
