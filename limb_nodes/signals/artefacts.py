@@ -22,6 +22,7 @@ CLIPPED_RUNS = 3
 STILL_TIME, STILL_SAMPLES = 0.1, 20
 # An input without a sensor changes by a step or two of the converter.
 LEVELS_WITHOUT_SIGNAL = 4
+MANY_LEVELS = 100
 LEAST_SAMPLES = 50
 NO_VALUE = "holds no value"
 
@@ -55,7 +56,7 @@ def artefacts(column: str, unit: str, values: FloatArray, rate: float, removed: 
         remedy = "replaced by a straight line" if removed else "--remove-spikes puts a straight line there"
         times = ", ".join(f"{_quantity(spike.value, unit)} at {spike.start:.6g} s" for spike in found)
         what = "a lone spike" if len(found) == 1 else f"{len(found)} lone spikes"
-        about = f"{what}, {times}, {ratio:.3g} times the highest wave beside; {remedy}"
+        about = f"{what}, {times}, {ratio:.3g} times as high as the next wave; {remedy}"
         found[0] = replace(found[0], note=f"channel {column}: {about}")
     rest = np.where(within(len(values), spiky), np.nan, values)
     limits = clipped_runs(rest)
@@ -75,6 +76,8 @@ def no_signal(values: FloatArray, rate: float) -> str:
         return NO_VALUE
     if np.ptp(good) <= 1e-9 * np.abs(good).max():
         return f"is {good[0]:g} everywhere"
+    if len(np.unique(good[:1000])) > MANY_LEVELS:
+        return ""
     spiky, _ = lone_spikes(values, rate)
     if len(spiky):
         good = values[np.isfinite(values) & ~within(len(values), spiky)]
@@ -99,23 +102,27 @@ def lone_spikes(values: FloatArray, rate: float) -> tuple[IntArray, float]:
     """
     none: tuple[IntArray, float] = (np.empty((0, 2), dtype=np.int64), 0.0)
     width = max(1, round(SPIKE_WIDTH * rate))
-    good = np.isfinite(values)
-    if good.sum() < LEAST_SAMPLES:
+    there = np.flatnonzero(np.isfinite(values))
+    if len(there) < max(LEAST_SAMPLES, 4 * width):
         return none
-    held = values if good.all() else np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
-    padded = np.pad(held, width, mode="reflect") if len(held) > width else np.pad(held, width, mode="edge")
-    before, after = padded[: -2 * width], padded[2 * width :]
+    # What lies on both sides of a gap is compared, and at an end the level there.
+    held = values[there]
+    before, after = np.roll(held, width), np.roll(held, -width)
+    before[:width], after[-width:] = _level(held, 0, width), _level(held, len(held) - 1, width)
     prominence = np.maximum(np.minimum(held - before, held - after), np.minimum(before - held, after - held))
     places, heights = _peaks(prominence, width)
-    ratios = heights[:-1] / np.maximum(heights[1:], np.finfo(float).tiny)
+    ratios = heights[:-1] / np.maximum(heights[1:], 1e-6 * heights[0] + np.finfo(float).tiny)
     count = int(ratios[:MOST_SPIKES].argmax()) + 1 if len(ratios) else 0
     if not count or ratios[count - 1] < SPIKE_RATIO:
         return none
-    spikes = [_extent(held, place, width) for place in np.sort(places[:count])]
-    # A wave that is broad does not fall back to where it came from within the width.
-    sharp = [_is_sharp(held, prominence[place], place, width) for place in np.sort(places[:count])]
-    kept = [spike for spike, is_sharp in zip(spikes, sharp, strict=True) if is_sharp]
-    return (np.array(kept, dtype=np.int64), float(min(ratios[count - 1], 1e6))) if kept else none
+    kept = [
+        (there[start], there[end - 1] + 1)
+        for place in np.sort(places[:count]).tolist()
+        # A wave that is broad does not fall back to where it came from within the width.
+        if prominence[place] > 0.5 * abs(held[place] - _level(held, place, width))
+        for start, end in [_extent(held, place, width)]
+    ]
+    return (np.array(kept, dtype=np.int64), float(ratios[count - 1])) if kept else none
 
 
 def clipped_runs(values: FloatArray) -> list[tuple[float, IntArray]]:
@@ -165,17 +172,15 @@ def _peaks(prominence: FloatArray, width: int) -> tuple[IntArray, FloatArray]:
 
 
 def _extent(values: FloatArray, place: int, width: int) -> tuple[int, int]:
-    """The samples around a spike's peak that lie off the level beside it by a tenth of its height."""
+    """The samples around a spike's peak, a width to each side at most, that are off the level by a tenth of it."""
     level = _level(values, place, width)
-    off = np.abs(values - level)[max(0, place - width) : place + width + 1] > 0.1 * abs(values[place] - level)
-    start = place - max(0, place - width)
-    first = start - int((~off[start::-1]).argmax() if not off[start::-1].all() else start + 1) + 1
-    last = start + int((~off[start:]).argmax() if not off[start:].all() else len(off) - start)
-    return place - start + first, place - start + last
-
-
-def _is_sharp(values: FloatArray, prominence: float, place: int, width: int) -> bool:
-    return bool(prominence > 0.5 * abs(values[place] - _level(values, place, width)))
+    off = np.abs(values - level) > 0.1 * abs(values[place] - level)
+    start = end = place
+    while start > max(0, place - width) and off[start - 1]:
+        start -= 1
+    while end < min(len(values) - 1, place + width) and off[end + 1]:
+        end += 1
+    return start, end + 1
 
 
 def _level(values: FloatArray, place: int, width: int) -> float:

@@ -52,10 +52,11 @@ class CausalChain:
 
     def process(self, values: FloatArray) -> FloatArray:
         """The envelopes [samples, channels] of the next samples, values [samples, channels]; the same as by steps."""
+        if not len(values):
+            return values.copy()
         if self._started.all() and np.isfinite(values).all():
             # The usual case by far, and the one in which a live source has no time to lose.
-            if len(values):
-                self._last = values[-1].copy()
+            self._last = values[-1].copy()
             return self._run(values, slice(None), None)
         held, starts = self._held(values)
         result = np.zeros(held.shape)
@@ -75,8 +76,7 @@ class CausalChain:
         if not finite.all():
             rows = np.maximum.accumulate(np.where(finite, np.arange(len(values))[:, None], -1), axis=0)
             held = np.where(rows < 0, self._last, np.take_along_axis(values, np.maximum(rows, 0), axis=0))
-        if len(held):
-            self._last = held[-1].copy()
+        self._last = held[-1].copy()
         return held, starts
 
     def _run(self, values: FloatArray, running: Mask | slice, new: Mask | None) -> FloatArray:
