@@ -26,6 +26,10 @@ from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.levels.muscle.path import muscle_tendon_length
 from limb_nodes.model import load_limb, parse_limb
 from limb_nodes.model.points import points
+from limb_nodes.signals.emg import envelopes
+from limb_nodes.signals.envelope_bag import write_envelopes as write_emg
+from limb_nodes.signals.options import EnvelopeOptions
+from limb_nodes.signals.recording import Recording
 
 PARAMS = Path(__file__).resolve().parents[2] / "params"
 RATE = 100
@@ -319,6 +323,62 @@ def test_an_envelope_bag_shows_channels_and_recorded_angles(tmp_path: Path) -> N
         assert_allclose(drawn(axes, look_of(index)[0]), values_of(3, 101)[:, index])
     assert_allclose(drawn(panel(figure, "angle"), "#000000"), np.degrees(values_of(1, 101)[:, 0]))
     assert figure.get_suptitle() == "walk.txt"
+
+
+def test_a_bag_of_limb_emg_shows_raw_emg_gaps_and_notes(tmp_path: Path) -> None:
+    rng, names = np.random.default_rng(0), ("RF", "BF", "VM", "ST")
+    time = np.arange(6000) / 1000.0
+    values = rng.normal(size=(6000, 4)) * (0.05 + np.clip(np.sin(np.pi * time), 0, 1))[:, None]
+    values[4100, 0] = 60.0
+    values[3000:4000, 1] = np.nan
+    values[:, 2] = np.clip(values[:, 2], -0.5, 0.5)
+    values[:, 3] = 0.0
+    recording = Recording("/somewhere/walk.txt", names, ("mV", "uV", "", "mV"), values, 1000.0)
+    options = EnvelopeOptions(channels={"RF": "rectus", "BF": "BF", "VM": "VM", "ST": "ST"}, keep_gaps=True)
+    result = envelopes(recording, options)
+    write_emg(result, tmp_path / "env", options)
+    series = read_series(tmp_path / "env")
+    figure = picture(series)
+    raw, drive = panels(figure, "raw"), panels(figure, "drive")
+    assert [axes.get_title(loc="left") for axes in raw] == [f"Raw EMG {name}" for name in ("rectus", *names[1:])]
+    assert [axes.get_ylabel() for axes in raw] == ["mV", "uV", "no unit", "mV"]
+    # As drawn, thinned, with the highest value kept.
+    assert np.nanmax(drawn(raw[0], "#999999")) == pytest.approx(60.0)
+    assert_allclose(np.nanmax(drawn(drive[2], look_of(2)[0])), 1.0)
+    marks = [[(mark.kind, mark.start, mark.end) for mark in one.marks] for one in columns_of(series)[0].panels if one]
+    assert marks[0] == [("spike", 4.1, 4.1)]
+    assert marks[1] == [("gap", pytest.approx(2.999), pytest.approx(4.0))]
+    assert [kind for kind, _, _ in marks[2]] == ["clipping", "clipping"]
+    assert marks[3] == [("no signal", 0.0, 5.999)]
+    for axes, kind in zip(raw, ("spike", "gap", "clipping", "no signal"), strict=True):
+        assert [text.get_text() for text in axes.texts] == [kind]
+    assert [[text.get_text() for text in axes.texts] for axes in drive] == [[], ["gap"], [], ["no signal"]]
+    (remarks,) = (axes for axes in figure.axes if axes.get_label() == "remarks")
+    written = " ".join(remarks.texts[0].get_text().split())
+    assert len(result.notes) == 5
+    for note in result.notes:
+        assert f"note: {note}" in written
+    # Raw EMG and envelope of a channel stand beside each other.
+    figure.draw_without_rendering()
+    for left, right in zip(raw, drive, strict=True):
+        assert_allclose(left.get_position().bounds[1::2], right.get_position().bounds[1::2], atol=1e-6)
+        assert left.get_position().x1 < right.get_position().x0
+
+
+def test_a_part_of_a_bag_of_limb_emg_can_be_drawn_and_one_without_raw_emg(tmp_path: Path) -> None:
+    values = np.random.default_rng(0).normal(size=(6000, 9))
+    names = tuple(f"muscle {k}" for k in range(9))
+    result = envelopes(Recording("walk.txt", names, ("mV",) * 9, values, 1000.0))
+    write_emg(result, tmp_path / "env")
+    series = read_series(tmp_path / "env", start=2.0, end=3.0)
+    assert series.raw is not None
+    assert (series.start, series.end) == (2.0, 3.0)
+    assert_allclose(series.raw.series.values, values[2000:3001], rtol=1e-6)
+    # Nine channels take two columns of panels, each beside that of its raw EMG.
+    assert [len([one for one in column.panels if one]) for column in columns_of(series)] == [5, 5, 4, 4]
+    write_emg(result, tmp_path / "less", raw=False)
+    assert read_series(tmp_path / "less").raw is None
+    assert panels(picture(read_series(tmp_path / "less")), "raw") == []
 
 
 def test_the_recorded_angle_is_drawn_beside_the_simulated_one(tmp_path: Path) -> None:

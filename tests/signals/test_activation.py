@@ -7,6 +7,7 @@ from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
 from limb_nodes.signals.activation import load_activation
+from tests.recordings import recorded
 
 MUSCLES = ["flexor", "extensor"]
 
@@ -162,6 +163,46 @@ def bad(source, words, muscles=MUSCLES, rate=100.0, duration=None):
 )
 def test_bad_csv(write, text, words):
     bad(write(text), words)
+
+
+@pytest.mark.parametrize("by", [1e-16, 1e-12, 1e-9, 9e-7])
+def test_values_outside_by_rounding_are_clipped_and_counted(write, bag, by):
+    text = write(f"time,flexor,extensor\n0,{-by:.17g},0\n1,0.5,{1 + by:.17g}\n2,{1 + by:.17g},1\n")
+    result = load_activation(text, MUSCLES, 1.0)
+    np.testing.assert_array_equal(result.values, [[0, 0], [0.5, 1], [1, 1]])
+    count = 1 if 1 + by == 1 else 3
+    assert result.notes == (f"values outside [0, 1] by rounding, by 1e-06 at most, clipped: {count}",)
+    values = [[0, 0, -by], [1 + by, 5, 0.5], [0, 0, 0]]
+    result = load_activation(bag(values=values, ticks=range(3)), MUSCLES, 100.0)
+    np.testing.assert_array_equal(result.values, [[0, 0], [0.5, 1], [0, 0]])
+
+
+@pytest.mark.parametrize("value", ["1.000002", "-0.000002", "1.5", "inf"])
+def test_values_outside_by_more_are_refused_without_talk_of_percent(write, value):
+    source = write(f"time,flexor,extensor\n0,0,0\n1,{value},0\n")
+    with pytest.raises(UserError) as error:
+        load_activation(source, MUSCLES, 1.0)
+    assert "percent" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("rows", "line"), [("0,0.4,0\n1,60,0", 3), ("0,0.4,0\n1,1.2,0\n2,60,0", 3), ("0,60,0\n1,0,0", 2)]
+)
+def test_percent_is_refused_with_the_advice(write, rows, line):
+    words = "a number in [0, 1] is needed; it reaches 60: divide it by 100 if it is in percent"
+    bad(write(f"time,flexor,extensor\n{rows}\n"), f"line {line}: flexor is ")
+    bad(write(f"time,flexor,extensor\n{rows}\n"), words)
+
+
+def test_recorded_envelopes_at_the_edge():
+    folder = recorded("emg_formats") / "envelope-edge"
+    negative = load_activation(str(folder / "negative_1e-12.csv"), ["RF", "BF"], 100.0)
+    assert (negative.values.min(), negative.values.max()) == (0.0, 0.2)
+    assert negative.notes[0] == "values outside [0, 1] by rounding, by 1e-06 at most, clipped: 2"
+    above = load_activation(str(folder / "overshoot_1e-9.csv"), ["RF"], 100.0)
+    assert above.values.max() == 1.0
+    assert above.notes[0] == "values outside [0, 1] by rounding, by 1e-06 at most, clipped: 1"
+    bad(str(folder / "percent.csv"), "divide it by 100 if it is in percent", muscles=["RF"])
 
 
 def test_bad_bags(bag, tmp_path):
