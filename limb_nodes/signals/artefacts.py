@@ -18,8 +18,10 @@ MOST_SPIKES = 20
 # Samples that lie this close to the highest, as a part of the range, count as equal to it: some steps of a converter.
 EQUAL = 2e-4
 CLIPPED_RUNS = 3
+CLIPPED_SAMPLES, CLIPPED_RATIO = 5, 4
 # Noise moves a sensor that works within this time (s) and these samples.
 STILL_TIME, STILL_SAMPLES = 0.1, 20
+MOST_REPEATED = 0.2
 # An input without a sensor changes by a step or two of the converter.
 LEVELS_WITHOUT_SIGNAL = 4
 MANY_LEVELS = 100
@@ -112,7 +114,9 @@ def lone_spikes(values: FloatArray, rate: float) -> tuple[IntArray, float]:
     prominence = np.maximum(np.minimum(held - before, held - after), np.minimum(before - held, after - held))
     places, heights = _peaks(prominence, width)
     ratios = heights[:-1] / np.maximum(heights[1:], 1e-6 * heights[0] + np.finfo(float).tiny)
-    count = int(ratios[:MOST_SPIKES].argmax()) + 1 if len(ratios) else 0
+    # Few, compared with all the waves that a recording of this length has.
+    most = min(MOST_SPIKES, 1 + len(held) // (50 * width))
+    count = int(ratios[:most].argmax()) + 1 if len(ratios) else 0
     if not count or ratios[count - 1] < SPIKE_RATIO:
         return none
     kept = [
@@ -128,8 +132,8 @@ def lone_spikes(values: FloatArray, rate: float) -> tuple[IntArray, float]:
 def clipped_runs(values: FloatArray) -> list[tuple[float, IntArray]]:
     """The levels at which a channel is cut off, each with its runs [runs, 2] of samples.
 
-    A limit is where samples pile up: several times two or more in a row, and more in all than in the hundredth of the
-    range below it. values: [samples], NaN where one is missing.
+    A limit is where samples pile up: more than in the hundredth of the range below it if two or more are in a row
+    several times, and far more if they are not. values: [samples], NaN where one is missing.
     """
     found = []
     good = np.isfinite(values)
@@ -144,17 +148,26 @@ def clipped_runs(values: FloatArray) -> list[tuple[float, IntArray]]:
         long = stretches[np.diff(stretches)[:, 0] >= 2]
         below = signed[~at_top].max(initial=-np.inf)
         near = int(((signed >= min(top - 0.01 * span, below)) & ~at_top).sum())
-        if len(long) >= CLIPPED_RUNS and at_top.sum() > near:
+        count = int(at_top.sum())
+        if (len(long) >= CLIPPED_RUNS and count > near) or count > max(CLIPPED_SAMPLES, CLIPPED_RATIO * near):
             found.append((sign * top, stretches))
     return found
 
 
 def still_runs(values: FloatArray, rate: float) -> IntArray:
-    """Where a channel keeps one value longer than noise would let it: [runs, 2]. values: [samples]; rate: Hz."""
+    """Where a channel keeps one value longer than its noise would let it: [runs, 2]. values: [samples]; rate: Hz.
+
+    A coarse converter that often repeats a value lets it rest long; nothing is said of it.
+    """
     same = np.diff(values) == 0.0
     stretches = runs(same)
+    lengths = np.diff(stretches)[:, 0]
+    long = lengths + 1 >= max(STILL_SAMPLES, STILL_TIME * rate)
+    others = len(same) - lengths[long].sum()
+    if lengths[~long].sum() > MOST_REPEATED * others:
+        return np.empty((0, 2), dtype=np.int64)
     stretches[:, 1] += 1
-    return stretches[np.diff(stretches)[:, 0] >= max(STILL_SAMPLES, STILL_TIME * rate)]
+    return stretches[long]
 
 
 def _peaks(prominence: FloatArray, width: int) -> tuple[IntArray, FloatArray]:

@@ -90,6 +90,8 @@ def envelopes(
     has a signal, or if a maximum is not above the rest level.
     """
     options = options or EnvelopeOptions()
+    # A rate that numpy computed cannot be written to a bag's run_info.
+    recording = replace(recording, rate=float(recording.rate))
     check_names(recording, options)
     check_numbers(options, recording.rate)
     emg_columns, angle_columns = chosen(recording, options)

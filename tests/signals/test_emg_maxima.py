@@ -128,6 +128,27 @@ def test_the_command_takes_several_files_and_keeps_the_raw_emg(tmp_path, capsys)
         assert "/emg_raw" not in bag.topics
 
 
+def test_what_was_noticed_is_in_the_bag(tmp_path):
+    raw = made("a", "b", "c", "d", rate=np.float64(1000.0))
+    raw.values[500:800, 0] = np.nan
+    raw.values[:, 1] = 0.0
+    raw.values[:, 2] = np.clip(raw.values[:, 2], -1, 1)
+    raw.values[1200:1500, 2] = 0.25
+    raw.values[100, 3] = 90.0
+    result = envelopes(raw, EnvelopeOptions(keep_gaps=True))
+    write_envelopes(result, tmp_path / "env")
+    with BagReader(tmp_path / "env") as bag:
+        noticed = bag.run_info()["artefacts"]
+    assert [(one["column"], one["kind"], one["start"], one["end"]) for one in noticed] == [
+        ("a", "gap", 0.5, 0.8),
+        ("b", "no signal", 0.0, 1.999),
+        *((one.column, one.kind, one.start, one.end) for one in result.artefacts[2:4]),
+        ("c", "still", 1.2, 1.499),
+        ("d", "spike", 0.1, 0.1),
+    ]
+    assert [one["kind"] for one in noticed[2:4]] == ["clipping", "clipping"]
+
+
 def test_the_raw_emg_keeps_its_gaps_at_an_odd_rate(tmp_path):
     raw = made("RF", "BF", rate=1925.926)
     raw.values[100:120, 1] = np.nan
