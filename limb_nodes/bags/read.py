@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack
 from operator import itemgetter
 from pathlib import Path
@@ -136,11 +136,31 @@ class BagReader:
         """
         name = self.name(topic)
         stamps, messages = self._messages(name)
+        return {"time": stamps * 1e-9, "stamp": stamps, **self.decoded(name, messages)}
+
+    def together(self, topics: Sequence[str]) -> Iterator[tuple[int, dict[str, bytes]]]:
+        """The serialised messages of several topics, those of one time together, with no more than a chunk in memory.
+
+        Returns:
+            Pairs of bag time (ns), rising, and the message of each topic that has one then, by absolute name;
+            of several messages of a topic the last.
+
+        Raises:
+            UserError: as `read_topic`.
+        """
+        return self._together([self.name(topic) for topic in topics])
+
+    def decoded(self, topic: str, messages: Sequence[bytes]) -> Columns:
+        """Serialised messages of a topic as arrays, at least one; `table` says in which shape.
+
+        Raises:
+            UserError: no such topic, or messages of different shape or with different names.
+        """
+        name = self.name(topic)
         try:
-            fields = columns(messages, self.topics[name], self._types(name))
+            return columns(messages, self.topics[name], self._types(name))
         except ValueError as error:
             raise UserError(f"{self.path}: topic {name}: {error}") from None
-        return {"time": stamps * 1e-9, "stamp": stamps, **fields}
 
     def kinds(self, topic: str) -> dict[str, str]:
         """The fields of a topic's type by their path, `outer.inner`, and what they hold; `fields.kinds` says how.
@@ -229,28 +249,43 @@ class BagReader:
         return np.array([stamp for stamp, _ in rows], dtype=np.int64), [data for _, data in rows]
 
     def _raw(self, name: str) -> Iterator[tuple[int, bytes]]:
-        """Time (ns) and bytes of each message of a topic, of all files in the order of time."""
-        parts: dict[int, list[Connection]] = {}
-        for file, connection in self._topics[name]:
-            parts.setdefault(self._files.index(file), []).append(connection)
+        """Time (ns) and bytes of each message of a topic, which together must not be too large."""
         size = 0
+        for _, stamp, message in self._merged([name]):
+            size += len(message)
+            if size > self._most_bytes:
+                raise UserError(
+                    f"{self.path}: topic {name} takes more than {self._most_bytes} bytes unpacked; a bag of measured "
+                    "values is needed"
+                )
+            yield stamp, message
+
+    def _merged(self, names: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
+        """Topic, time (ns) and bytes of each message of topics, of all files in the order of time."""
+        parts: dict[int, list[Connection]] = {}
+        for name in names:
+            for file, connection in self._topics[name]:
+                parts.setdefault(self._files.index(file), []).append(connection)
         try:
             files = [self._files[index].messages(connections) for index, connections in parts.items()]
-            for _, stamp, data in heapq.merge(*files, key=itemgetter(1)):
+            for connection, stamp, data in heapq.merge(*files, key=itemgetter(1)):
                 if not _FIRST <= stamp <= _LAST:
                     raise ValueError(f"a message is of the time {stamp} ns")
-                message = unpack_message(data)
-                size += len(message)
-                if size > self._most_bytes:
-                    break
-                yield int(stamp), message
+                yield connection.topic, int(stamp), unpack_message(data)
         except Exception as error:
             raise self._damaged(error) from None
-        if size > self._most_bytes:
-            raise UserError(
-                f"{self.path}: topic {name} takes more than {self._most_bytes} bytes unpacked; a bag of measured "
-                "values is needed"
-            )
+
+    def _together(self, names: Collection[str]) -> Iterator[tuple[int, dict[str, bytes]]]:
+        now: int | None = None
+        messages: dict[str, bytes] = {}
+        for topic, stamp, data in self._merged(names):
+            if stamp != now:
+                if now is not None:
+                    yield now, messages
+                now, messages = stamp, {}
+            messages[topic] = data
+        if now is not None:
+            yield now, messages
 
     def _decoded(self, name: str, store: Typestore) -> Iterator[tuple[int, Any]]:
         msgtype = self.topics[name]
