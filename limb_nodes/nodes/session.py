@@ -86,9 +86,10 @@ def spin_to_the_end(executor: Executor, nodes: Mapping[str, Any], interrupt: Int
     recorder, dynamics = nodes["recorder"], nodes["limb_dynamics"]
     started, shown = None, recorder.announced
     while not (recorder.finished or interrupt.wanted):
+        turn = time.monotonic()
         executor.spin_once(timeout_sec=TURN)
         if started is None and dynamics.tick > 0:
-            started = time.monotonic()
+            started = turn
         if recorder.announced != shown:
             shown = recorder.announced
             progress(shown)

@@ -120,8 +120,7 @@ def test_limb_dynamics_gives_way_to_an_earlier_claim_and_answers_a_later_one(ben
     assert heard[0].frame_id == node.identity
     claims = graph.publisher(Header, "run_identity", LATCHED, listeners=2)
     claims.publish(new_claim(new_identity()))
-    graph.until(lambda: len(heard) == 3, "its claim, again")
-    assert heard[2] == heard[0]
+    graph.until(lambda: heard.count(heard[0]) == 2, "its claim, again")
     assert node.failure == ""
     claims.publish(earlier)
     graph.until(lambda: node.failure, "it to give way")

@@ -104,6 +104,7 @@ def test_a_node_that_is_started_anew_before_the_run(reference, limb, waves, bags
     graph.until(lambda: "muscle_stack" in recorder.asked, "the question")
     first.signal(signal.SIGKILL)
     first.wait()
+    assert "muscle_stack" not in recorder.parameters
     second = processes.node("muscle_stack", **given["muscle_stack"])
     graph.until(lambda: recorder.finished, "the end")
     graph.finish(recorder)
