@@ -261,7 +261,7 @@ def started_nodes() -> Iterator[list[Any]]:
                 overrides = [RosParameter(key, value=value) for key, value in values.items()]
                 nodes[name] = node_class(context=context, parameter_overrides=overrides)
             # Which a live activation_input does by itself once the limb moves.
-            nodes["activation_input"].hear_envelopes()
+            nodes["activation_input"].live.open()
             yield list(nodes.values())
         finally:
             LimbNode._declare = declare

@@ -8,13 +8,17 @@ import shlex
 import sys
 from typing import Any
 
+# Exit status of a run whose live source never came, or was silent at its end.
+INPUT_LOST = 3
+
 
 def add_parser(subparsers: Any) -> None:
     """Declare the command."""
     parser = subparsers.add_parser(
         "run",
         help="run a limb as ROS 2 nodes and record it",
-        description="Run activation_input, muscle_stack, limb_dynamics and recorder until the activation ends.",
+        description="Run activation_input, muscle_stack, limb_dynamics and recorder until the activation ends. "
+        "Exit status 3 if a live source never came or was silent at the end.",
     )
     parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
     parser.add_argument(
@@ -23,7 +27,7 @@ def add_parser(subparsers: Any) -> None:
         default="",
         metavar="SOURCE",
         help="envelope bag, CSV, waveform YAML or constants (flexor=0.9,extensor=0); without it, in real time, "
-        "live from the topic emg_envelope",
+        "live from the topic emg_envelope, or emg with --emg-rate",
     )
     parser.add_argument("--duration", type=float, default=None, metavar="S", help="s (default: the whole recording)")
     parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="ticks per second (default 1000)")
@@ -33,6 +37,32 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--namespace", default="", metavar="NS", help="namespace of all nodes, for several limbs")
     parser.add_argument("--state-every", type=int, default=1, metavar="N", help="record states every N ticks")
     parser.add_argument("--no-states", action="store_true", help="do not record muscle, unit and sarcomere states")
+    live = parser.add_argument_group("live input")
+    live.add_argument(
+        "--channels", action="append", default=[], metavar="CHANNEL=MUSCLE",
+        help="the source's name of a muscle; repeatable; for raw EMG all channels in the order of the values, CHANNEL "
+        "alone for one that is not used (default: the muscles)",
+    )  # fmt: skip
+    live.add_argument(
+        "--on-silence", choices=("hold", "zero", "stop"), default="hold",
+        help="if a source is silent, hold its last activations, make them zero, or stop the run (default hold)",
+    )  # fmt: skip
+    live.add_argument(
+        "--silence", type=float, default=0.5, metavar="S", help="a source is silent after so long (default 0.5)"
+    )
+    live.add_argument(
+        "--emg-rate", type=float, default=0.0, metavar="HZ",
+        help="samples per second of raw EMG on the topic emg, filtered as by `limb emg --causal` (default: envelopes)",
+    )  # fmt: skip
+    live.add_argument(
+        "--maximum", action="append", default=[], metavar="CHANNEL=VALUE",
+        help="envelope of the raw EMG that becomes 1, in its unit; repeatable",
+    )  # fmt: skip
+    live.add_argument("--mains", type=float, default=0.0, metavar="HZ", help="notch, 50 or 60 (default: none)")
+    live.add_argument(
+        "--band-pass", dest="band", default="20,450", metavar="LOW,HIGH", help="edges in Hz (default 20,450)"
+    )
+    live.add_argument("--low-pass", type=float, default=6.0, metavar="HZ", help="corner (default 6)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -41,6 +71,7 @@ def run(args: argparse.Namespace) -> int:
 
     from limb_nodes.foundation.parameter import Parameter
     from limb_nodes.nodes.base import STATES
+    from limb_nodes.nodes.live_settings import LiveSettings
     from limb_nodes.nodes.session import run_in_one_process, run_in_processes
     from limb_nodes.nodes.settings import RunSettings, checked
 
@@ -58,6 +89,16 @@ def run(args: argparse.Namespace) -> int:
         states=() if args.no_states else STATES,
         state_every=args.state_every,
         command=shlex.join(["limb", *sys.argv[1:]]),
+        live=LiveSettings(
+            channels=",".join(args.channels),
+            on_silence=args.on_silence,
+            silence=args.silence,
+            emg_rate=args.emg_rate,
+            maximum=",".join(args.maximum),
+            mains=args.mains,
+            band=args.band,
+            low_pass=args.low_pass,
+        ),
     )
     ready, final = checked(settings)
     with tqdm(
@@ -78,9 +119,11 @@ def run(args: argparse.Namespace) -> int:
         print(f"deadlines  {outcome.missed} missed")
     if outcome.bad_input:
         print(f"bad input  {outcome.bad_input} messages kept out")
+    if outcome.live:
+        print(f"live input {outcome.live}")
     print(f"wall time  {outcome.seconds:.2f} s ({seconds / max(outcome.seconds, 1e-9):.3g} simulated s per s)")
     print(f"bag        {args.out}")
     if outcome.interrupted:
         print("interrupted; the bag holds what was recorded until then")
         return 130
-    return 0
+    return INPUT_LOST if outcome.lost else 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 TOPIC_TYPES: dict[str, str] = {
+    "emg": "std_msgs/msg/Float64MultiArray",
     "emg_raw": "std_msgs/msg/Float32MultiArray",
     "emg_envelope": "limb_msgs/msg/MuscleActivation",
     "reference_angle": "sensor_msgs/msg/JointState",

@@ -34,3 +34,10 @@ EVERY = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.VOLATILE,
 )
+# As EVERY, for sources that offer no more; it hears reliable ones too.
+BEST_EFFORT = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=HISTORY,
+    reliability=ReliabilityPolicy.BEST_EFFORT,
+    durability=DurabilityPolicy.VOLATILE,
+)

@@ -23,10 +23,11 @@ from limb_msgs.msg import (
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header, String
+from std_msgs.msg import Float64MultiArray, Header, String
 
 from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.bags.versions import versions
@@ -36,7 +37,8 @@ from limb_nodes.foundation.topics import LATCHED_TOPICS, TOPIC_TYPES
 from limb_nodes.model import user_sources
 from limb_nodes.nodes.base import NODES, STATES, LimbNode
 from limb_nodes.nodes.distribution import parameter_values, taken
-from limb_nodes.nodes.qos import EVERY, LATCHED, STREAM
+from limb_nodes.nodes.live_source import LOOK_PERIOD, QUIET, quality_for
+from limb_nodes.nodes.qos import BEST_EFFORT, EVERY, LATCHED, STREAM
 from limb_nodes.nodes.running import main_of
 from limb_nodes.nodes.wire import stamp_of
 
@@ -49,7 +51,9 @@ TICKED = {
     "motor_unit_state": MotorUnitState,
     "sarcomere_state": SarcomereState,
 }
-OTHERS = {"emg_envelope": MuscleActivation, "external_load": WrenchStamped, "/diagnostics": DiagnosticArray}
+# Of sources, which may offer best effort alone.
+SOURCES = {"emg": Float64MultiArray, "emg_envelope": MuscleActivation}
+OTHERS = {**SOURCES, "external_load": WrenchStamped, "/diagnostics": DiagnosticArray}
 # How often the topics are emptied (s). An executor would take three times as long for each message.
 POLL_PERIOD = 0.005
 # How long to wait for the other nodes to tell their parameters once messages flow (s).
@@ -89,14 +93,29 @@ class Recorder(LimbNode):
             topic: self.create_subscription(kind, topic, refuse, STREAM, raw=True) for topic, kind in TICKED.items()
         }
         self.others = {
-            topic: self.create_subscription(kind, topic, refuse, EVERY, raw=True) for topic, kind in OTHERS.items()
+            topic: self.create_subscription(
+                kind, topic, refuse, EVERY, raw=True, event_callbacks=QUIET if topic in SOURCES else None
+            )
+            for topic, kind in OTHERS.items()
         }
+        self.create_timer(LOOK_PERIOD, self.suit_sources, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_timer(POLL_PERIOD, self.on_poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.description: str | None = None
         self.listen(String, "robot_description", self.on_description, LATCHED)
         if not self.identity:
             self.listen(Header, "run_identity", self.on_claim, STREAM)
         self.asking = self.create_timer(0.05, self.ask)
+
+    def suit_sources(self) -> None:
+        """Subscribe as best-effort sources need it, once there is one."""
+        for topic, kind in SOURCES.items():
+            if self.others[topic].qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT:
+                continue
+            if (quality := quality_for(self, topic)) is BEST_EFFORT:
+                self.destroy_subscription(self.others[topic])
+                self.others[topic] = self.create_subscription(
+                    kind, topic, refuse, quality, raw=True, event_callbacks=QUIET
+                )
 
     def on_claim(self, claim: Header) -> None:
         """Without an identity of its own, record the run that was heard of last, until its first message is there."""

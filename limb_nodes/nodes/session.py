@@ -58,7 +58,7 @@ def run_in_one_process(settings: RunSettings, progress: Progress) -> Outcome:
         gc.collect()
         gc.freeze()
         seconds = spin_to_the_end(executor, nodes, interrupt, progress)
-        recorder = nodes["recorder"]
+        recorder, live = nodes["recorder"], nodes["activation_input"].live
         return Outcome(
             ticks=recorder.counts["joint_states"],
             missing=recorder.missing(),
@@ -66,6 +66,8 @@ def run_in_one_process(settings: RunSettings, progress: Progress) -> Outcome:
             bad_input=sum(node.bad_input for node in nodes.values()),
             seconds=seconds,
             interrupted=interrupt.wanted,
+            live=live.told() if live else "",
+            lost=bool(live and live.lost),
         )
     finally:
         close(context, executor, nodes.values())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,8 @@ from limb_nodes.errors import FieldError
 from limb_nodes.model import load_limb
 from limb_nodes.nodes.base import NODES, STATES
 from limb_nodes.nodes.identity import new_identity
+from limb_nodes.nodes.live_readers import reader
+from limb_nodes.nodes.live_settings import HEARD, LiveSettings
 from limb_nodes.nodes.running import check_namespace
 from limb_nodes.nodes.ticks import Ticks
 from limb_nodes.signals.activation import load_activation
@@ -28,7 +30,8 @@ class RunSettings:
     """What to run. limb: YAML file. source: of activations, empty for live input. rate: Hz.
 
     duration: s, 0 for the whole source. out: folder of the bag. namespace: of all nodes. states: topics of states to
-    record, every `state_every` ticks. command: that started the run, for the record. identity: of the run.
+    record, every `state_every` ticks. command: that started the run, for the record. live: how a live source is taken.
+    identity: of the run.
     """
 
     limb: str
@@ -41,13 +44,14 @@ class RunSettings:
     states: tuple[str, ...] = STATES
     state_every: int = 1
     command: str = ""
+    live: LiveSettings = field(default_factory=LiveSettings)
     identity: str = field(default_factory=new_identity)
 
     def parameters(self, node: str) -> dict[str, Any]:
         """The ROS parameters of a node."""
         common = {"limb": self.limb, "mode": self.mode, "rate": self.rate, "identity": self.identity}
         own: dict[str, dict[str, Any]] = {
-            "activation_input": {"source": self.source, "duration": self.duration},
+            "activation_input": {"source": self.source, "duration": self.duration, **asdict(self.live)},
             "muscle_stack": {
                 "state_every": self.state_every,
                 **{f"publish_{topic}": topic in self.states for topic in STATES},
@@ -61,7 +65,8 @@ class RunSettings:
 @dataclass(frozen=True)
 class Outcome:
     """How a run went. ticks: on the topic joint_states; missing: ticks not in the bag, over all topics;
-    missed: deadlines in real time; bad_input: messages that could not be used; seconds: wall time.
+    missed: deadlines in real time; bad_input: messages that could not be used; seconds: wall time. live: how a live
+    source did, in words, empty without one; lost: whether it never came, or was silent at the end.
     """
 
     ticks: int
@@ -70,6 +75,8 @@ class Outcome:
     bad_input: int
     seconds: float
     interrupted: bool
+    live: str = ""
+    lost: bool = False
 
 
 def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
@@ -93,8 +100,13 @@ def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
         activation = load_activation(source, limb.muscle_names, settings.rate, settings.duration or None)
         final = len(activation.values) - 1
         source = str(Path(source).resolve()) if Path(source).exists() else source
+        for name, value in asdict(settings.live).items():
+            if value != getattr(LiveSettings(), name):
+                raise FieldError(name, f"is {value}; a live source is needed, not {settings.source}")
     elif settings.mode == "lockstep":
         raise FieldError("source", "is missing; in lockstep a bag, CSV, waveform YAML or constants are needed")
+    else:
+        reader(limb.muscle_names, settings.live)
     limb_file, out = str(Path(settings.limb).resolve()), str(Path(settings.out).resolve())
     return replace(settings, limb=limb_file, out=out, source=source), final
 
@@ -107,18 +119,24 @@ def recorded_outcome(settings: RunSettings, seconds: float, interrupted: bool) -
         for topic in ("activation", "joint_torque", "movement_pattern", *settings.states):
             every = settings.state_every if topic in settings.states else 1
             missing += max(0, -(-ticks // every) - bag.count(topic))
-        missed, bad_input = reported(bag, settings.namespace)
-    return Outcome(ticks, missing, missed, bad_input, seconds, interrupted)
+        missed, bad_input, live, lost = reported(bag, settings)
+    return Outcome(ticks, missing, missed, bad_input, seconds, interrupted, live, lost)
 
 
-def reported(bag: BagReader, namespace: str) -> tuple[int, int]:
-    """Missed deadlines and messages that could not be used, as the nodes have told on `/diagnostics`."""
+def reported(bag: BagReader, settings: RunSettings) -> tuple[int, int, str, bool]:
+    """What the nodes have told on `/diagnostics`.
+
+    Missed deadlines, messages that could not be used, how a live source did, and whether it was lost.
+    """
     missed, bad_input = 0, dict.fromkeys(NODES, 0)
-    names = {f"/{namespace.strip('/')}/{node}".replace("//", "/"): node for node in NODES}
+    live, lost = ("nothing is known of the live source", True) if not settings.source else ("", False)
+    names = {f"/{settings.namespace.strip('/')}/{node}".replace("//", "/"): node for node in NODES}
     messages = bag.read_topic("/diagnostics") if bag.has("/diagnostics") else ()
     for status in (status for _, message in messages for status in message.status if status.name in names):
-        values = {pair.key: int(pair.value) for pair in status.values}
-        missed = max(missed, values.get("missed_deadlines", 0))
+        values = {pair.key: pair.value for pair in status.values}
+        missed = max(missed, int(values.get("missed_deadlines", 0)))
         node = names[status.name]
-        bad_input[node] = max(bad_input[node], values.get("bad_input", 0))
-    return missed, sum(bad_input.values())
+        bad_input[node] = max(bad_input[node], int(values.get("bad_input", 0)))
+        if "input" in values:
+            live, lost = status.message, values["input"] != HEARD
+    return missed, sum(bad_input.values()), live, lost
