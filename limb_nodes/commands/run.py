@@ -45,7 +45,8 @@ def add_parser(subparsers: Any) -> None:
     )  # fmt: skip
     live.add_argument(
         "--on-silence", choices=("hold", "zero", "stop"), default="hold",
-        help="if a source is silent, hold its last activations, make them zero, or stop the run (default hold)",
+        help="if a source is silent, hold its last activations, make them zero, or stop the run; one that never came "
+        "has 10 s to come (default hold)",
     )  # fmt: skip
     live.add_argument(
         "--silence", type=float, default=0.5, metavar="S", help="a source is silent after so long (default 0.5)"

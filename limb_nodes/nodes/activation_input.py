@@ -41,7 +41,6 @@ class ActivationInput(LimbNode):
         self.on_silence = settings.on_silence
         self.source: Activation | None = None
         self.live: LiveSource | None = None
-        self.stopping = False
         self.final: int | None = None
         self.muscles = self.limb.muscle_names
         if source:
@@ -109,7 +108,7 @@ class ActivationInput(LimbNode):
     def live_source(self, settings: LiveSettings) -> LiveSource:
         """The live source that the settings ask for."""
         try:
-            return LiveSource(self, reader(self.muscles, settings), settings, len(self.muscles))
+            return LiveSource(self, reader(self.muscles, settings), settings.silence, len(self.muscles))
         except FieldError as error:
             raise UserError(f"activation_input: {error.line(f'the parameter {error.field}')}") from None
 
@@ -129,8 +128,8 @@ class ActivationInput(LimbNode):
             if self.live.subscription is None and now > 0:
                 # Not before the limb moves, so that who waits for a listener starts together with the limb.
                 self.live.open()
-            if self.live.silent and self.on_silence == "stop" and not self.stopping:
-                self.stopping = True
+            if self.live.gone and self.on_silence == "stop" and not self.live.closed:
+                self.live.closed = True
                 # The limb may be ahead by some ticks; all nodes must hear in time which is the last.
                 following = last + 1 + round(NOTICE * self.ticks.rate)
                 self.final = following if self.final is None else min(self.final, following)

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from limb_nodes.nodes.live_readers import EnvelopeReader, RawReader
-from limb_nodes.nodes.live_settings import HEARD, NEVER_CAME, SILENT, LiveSettings
+from limb_nodes.nodes.live_settings import HEARD, NEVER_CAME, SILENT
 from limb_nodes.nodes.qos import BEST_EFFORT, EVERY
 from limb_nodes.nodes.wire import type_name
 
@@ -25,6 +25,8 @@ LOOK_PERIOD = 0.05
 LONGEST_LOOK = 2 * LOOK_PERIOD
 # How often the state of a source is told (s).
 REPORT_PERIOD = 1.0
+# How long a source may take to come (s): nodes may take seconds to find each other.
+PATIENCE = 10.0
 # The node itself subscribes with these, so that nothing is said of a quality that does not fit: it takes another then.
 QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
 
@@ -44,17 +46,17 @@ class LiveSource:
 
     values: the newest activations [muscles], 0 at first. messages: that have come; used: that could be used;
     unstamped: that came with the time 0, after one that did too. age: time since the last one that was used, or since
-    listening began (s), as far as the node could hear. silent: whether this is too long.
+    listening began (s), as far as the node could hear. silent: whether this is too long. closed: whether what comes is
+    not taken any more.
     """
 
-    def __init__(
-        self, node: LimbNode, reader: EnvelopeReader | RawReader, settings: LiveSettings, muscles: int
-    ) -> None:
+    def __init__(self, node: LimbNode, reader: EnvelopeReader | RawReader, silence: float, muscles: int) -> None:
         self.values = np.zeros(muscles)
         self.messages = self.used = self.unstamped = 0
         self.age, self.silent = 0.0, False
+        self.closed = False
         self.subscription: Any = None
-        self._node, self._reader, self._settings = node, reader, settings
+        self._node, self._reader, self._silence = node, reader, silence
         self._topic = reader.topic
         self._problem = ""
         self._zero_before = False
@@ -67,6 +69,11 @@ class LiveSource:
         self._node.create_timer(LOOK_PERIOD, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
+    def gone(self) -> bool:
+        """Whether it is no use to wait any longer."""
+        return self.silent and (self.used > 0 or self.age >= PATIENCE)
+
+    @property
     def lost(self) -> bool:
         """Whether nothing that can be used has come, or comes any more."""
         return self.silent or not self.used
@@ -76,7 +83,7 @@ class LiveSource:
         now = time.monotonic()
         self.age += min(now - self._looked, LONGEST_LOOK)
         self._looked = now
-        if self.age >= self._settings.silence and not self.silent:
+        if self.age >= self._silence and not self.silent:
             self.silent = True
             self._node.get_logger().warning(self.told())
             self.report()
@@ -128,8 +135,7 @@ class LiveSource:
                 self._subscribe(quality)
 
     def _on_message(self, message: Any) -> None:
-        if self.silent and self._settings.on_silence == "stop":
-            # The run ends for it.
+        if self.closed:
             return
         self.messages += 1
         self._look_at_stamp(self._reader.stamp(message))
