@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from limb_nodes.bags.folder import refuse_existing
-from limb_nodes.commands.text_options import add_text_options, text_options
 from limb_nodes.errors import FieldError
 from limb_nodes.foundation.text_table import aligned
 from limb_nodes.signals.bag_field import BagOptions
@@ -16,6 +15,7 @@ from limb_nodes.signals.envelope import DEFAULT_BAND, DEFAULT_LOW_PASS, DEFAULT_
 from limb_nodes.signals.envelope_bag import write_envelopes
 from limb_nodes.signals.options import DEFAULT_LONGEST_GAP, EnvelopeOptions
 from limb_nodes.signals.recording import read_recording
+from limb_nodes.signals.text_options import DECIMALS, TextOptions
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -139,6 +139,47 @@ def bag_options(args: argparse.Namespace) -> BagOptions:
         if not name or names.count(name) > 1:
             raise FieldError("names", f"is {args.names}; different names such as RF,VM are needed")
     return BagOptions(args.topic, args.field, tuple(names), args.stamps, args.rows)
+
+
+def add_text_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that overrule what is concluded from a text file."""
+    text = parser.add_argument_group("how a text file is read")
+    text.add_argument(
+        "--delimiter",
+        metavar="SIGN",
+        help="between columns: comma, semicolon, tab or blanks (default: as the rows show)",
+    )
+    text.add_argument("--decimal", choices=DECIMALS, help="decimal mark (default: as the rows show)")
+    text.add_argument(
+        "--header-row", type=int, metavar="LINE",
+        help="line of the columns' names, from 1; 0: there is none, they are named 'column 1' and so on",
+    )  # fmt: skip
+    text.add_argument("--encoding", metavar="NAME", help="such as utf-8 or cp1252 (default: as the first bytes show)")
+    times = text.add_mutually_exclusive_group()
+    times.add_argument("--time", metavar="COLUMN", help="column of times (default: by its name, or as it rises evenly)")
+    times.add_argument(
+        "--no-times", action="store_true", help="do not use times; the rate is that of --rate or the header"
+    )
+    text.add_argument(
+        "--unit", dest="units", action="append", default=[], metavar="[COLUMN=]UNIT",
+        help="unit of a column, or of all that state none; repeatable",
+    )  # fmt: skip
+
+
+def text_options(args: argparse.Namespace, columns: Sequence[str]) -> TextOptions:
+    """What was said of the text file. columns: those that are asked for by name."""
+    pairs = [entry.rpartition("=") for entry in args.units]
+    return TextOptions(
+        encoding=args.encoding,
+        delimiter=args.delimiter,
+        decimal=args.decimal,
+        header_row=args.header_row,
+        time=args.time,
+        no_times=args.no_times,
+        units={column: unit for column, _, unit in pairs},
+        skip=tuple(args.skip),
+        wanted=tuple(columns),
+    )
 
 
 def run(args: argparse.Namespace) -> int:

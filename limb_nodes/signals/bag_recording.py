@@ -9,7 +9,8 @@ from limb_nodes.signals.clock import fit_clock
 from limb_nodes.signals.named_values import read_named_values
 from limb_nodes.signals.recording import Recording, without_empty_end
 
-RAW_TOPIC = "emg_raw"
+# Raw EMG that `limb emg` has kept, and that a live source sends.
+RAW_TOPICS = ("emg_raw", "emg")
 
 
 def read_bag_recording(path: str | Path, rate: float | None = None, options: BagOptions | None = None) -> Recording:
@@ -20,7 +21,7 @@ def read_bag_recording(path: str | Path, rate: float | None = None, options: Bag
     Raises UserError if the bag cannot be read, or its times have no even clock; FieldError if an option is at fault or
     could decide.
     """
-    series = read_named_values(path, (RAW_TOPIC,), options, rate)
+    series = read_named_values(path, RAW_TOPICS, options, rate)
     values, empty = without_empty_end(f"{path}: topic {series.topic}", series.values)
     fitted = fit_clock(str(path), series.times[: len(values)], series.place, rate)
     units = ("",) * len(series.names)

@@ -18,7 +18,8 @@ from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.parameter import Parameter
 
-RATE = Parameter("rate", "Hz", "samples per second", above=0.0, maximum=1e6)
+_HIGHEST = 1e6
+RATE = Parameter("rate", "Hz", "samples per second", above=0.0, maximum=_HIGHEST)
 # A clock whose rate moves by more than this part is not one clock.
 _SAME_RATE = 0.005
 # Later times (s) are none; from 1970 on, 3 million years.
@@ -121,6 +122,8 @@ def _fit(source: str, times: FloatArray, place: Callable[[int], str], stated: fl
             _check_size(source, times, missing, place)
             rows = np.arange(len(times)) + np.concatenate([[0.0], np.cumsum(missing)])
             step, offset = _robust_line(rows, relative)
+            if not 1.0 / _HIGHEST < step < _LATEST:
+                raise _uneven(source, times, int(np.abs(np.diff(relative)).argmax()) + 1, parts.step, place)
         ticks = rows.astype(np.int64) if missing.any() else None
         line = step, offset, 0.0
     slope, offset, width = line

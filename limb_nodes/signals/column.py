@@ -43,6 +43,8 @@ _KINDS = {
     "torque": r".*\b(torque|moment)\b.*",
     "an angle without a unit": r".*\b(angle|goniometer)\b.*",
 }
+# Longer cells are remarks and no names.
+_LONGEST = 300
 _WORDS = {kind: re.compile(words) for kind, words in _KINDS.items()}
 
 
@@ -59,14 +61,14 @@ class Column:
     @property
     def says_time(self) -> bool:
         """Whether name or unit say that it holds times."""
-        if self.unit not in units.TIME:
+        if self.unit not in units.TIME or len(self.name) > _LONGEST:
             return False
         return bool(_TIME.search(self.name.lower().replace("_", " "))) or (self.unit in {"s", "ms", "us", "ns"})
 
     @property
     def kind(self) -> str:
         """What its name says that it holds, if it states no unit and is no signal of a muscle; else ""."""
-        if self.unit:
+        if self.unit or len(self.name) > _LONGEST:
             return ""
         plain = re.sub(r"[_\s]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", self.name)).strip().lower()
         return next((kind for kind, words in _WORDS.items() if words.fullmatch(plain)), "")
@@ -75,7 +77,7 @@ class Column:
 def column_of(cell: str, unit: str = "") -> Column:
     """The column that a cell of the header names; unit: what a row of units states, which counts before the name."""
     cell = " ".join(cell.split())
-    name, named = _split(cell)
+    name, named = _split(cell) if len(cell) < _LONGEST else (cell, "")
     if not unit:
         return Column(name, named)
     return Column(name if named else cell, units.unit_named(unit) or unit)
@@ -87,9 +89,11 @@ def _split(cell: str) -> tuple[str, str]:
         unit, inside = units.unit_named(match["unit"]), match["unit"]
         if unit is not None:
             return match["name"], unit
+        if inside.isdigit():
+            return cell, ""
         # Square brackets hold units; round ones also words, such as sides and numbers.
         short = 0 < len(inside) <= 3 or re.search(r"[°·^/²³*]", inside)
-        if inside.lower() not in _SIDES and not inside.isdigit() and (match["open"] == "[" or short) and inside:
+        if inside.lower() not in _SIDES and (match["open"] == "[" or short) and inside:
             return match["name"], inside
         return cell, ""
     match = _SUFFIX.fullmatch(cell)

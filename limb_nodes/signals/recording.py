@@ -113,25 +113,15 @@ def _from_table(table: TextTable, text: TextOptions, rate: float | None) -> Reco
 
 def _signals(table: TextTable, wanted: Sequence[str], notes: list[str]) -> list[int]:
     """The columns that may be EMG or angles, or that are asked for; what the others are is noted."""
-    kept, left = [], []
+    kept = []
     for index, column in enumerate(table.columns):
-        nameless = column.name == f"column {index + 1}" and table.layout.names_line is not None
-        kind = "a column without a name" if not column.unit and _is_nameless(table, index, nameless) else column.kind
+        nameless = column.name in table.nameless and not column.unit
+        kind = "a column without a name" if nameless else column.kind
         if kind and column.name not in wanted:
-            left.append(f"{column.name} left out: {kind}")
+            notes.append(f"{column.name} left out: {kind}")
         else:
             kept.append(index)
-    notes += left
     return kept
-
-
-def _is_nameless(table: TextTable, index: int, nameless: bool) -> bool:
-    name = table.columns[index].name
-    return (
-        name.startswith("column ")
-        and all(column.name != name for column in table.layout.columns)
-        and (nameless or any(column.name for column in table.layout.columns))
-    )
 
 
 def _clock(table: TextTable, chosen: list[int], kept: list[int]) -> tuple[Clock | None, list[int]]:

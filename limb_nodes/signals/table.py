@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
-import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,7 +28,8 @@ from limb_nodes.signals.text_options import TextOptions
 MOST_WRONG = 1e-3
 # Seconds since 1970 in our century, and the same in smaller units.
 _EPOCH = (9e8, 5e9)
-_TRUTH = re.compile(rb"true|false", re.IGNORECASE)
+_TRUTH = (b"rue", b"RUE", b"alse", b"ALSE")
+_LONGEST_NAME = 80
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "blanks"}
 
 
@@ -36,7 +37,7 @@ _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "blanks"}
 class Clock:
     """A column of times and what it belongs to.
 
-    name: as the header has it. unit: as stated or concluded. times: [rows], s, NaN where a cell is empty.
+    name: as the header has it. unit: as stated or concluded. times: [rows], s, NaN if a cell is empty.
     columns: indexes of the columns beside it.
     """
 
@@ -53,11 +54,12 @@ class TextTable:
     source: the file, as the user named it.
     layout: how the file is written.
     columns: one for each column but those of times; `name` is never empty nor given twice.
-    values: [rows, columns], in the columns' units; NaN where a cell is empty.
+    values: [rows, columns], in the columns' units; NaN if a cell is empty.
     clocks: the columns of times; more than one if columns of several rates stand side by side.
     rates: by column, the rate (Hz) that is stated above it.
     lines: blocks of rows, each as its first row and the line of that row, or the lines of all its rows.
-    repeated: names that several columns had. skipped: columns that were left out as asked.
+    nameless: columns that the header does not name. repeated: names that several columns had.
+    skipped: columns that were left out as asked.
     notes: what a person should know of how the file was read, one sentence each.
     """
 
@@ -68,6 +70,7 @@ class TextTable:
     clocks: tuple[Clock, ...]
     rates: dict[int, float]
     lines: tuple[tuple[int, int | npt.NDArray[np.int64]], ...]
+    nameless: frozenset[str] = frozenset()
     repeated: tuple[str, ...] = ()
     skipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -148,6 +151,9 @@ class _Naming:
         self.notes: list[str] = []
         self.repeated: tuple[str, ...] = ()
         self.labels = self._unique_names()
+        self.nameless = frozenset(
+            label for label, column in zip(self.labels, self.columns, strict=True) if not column.name
+        )
         self._units(source, options)
         self.skipped = tuple(dict.fromkeys(options.skip))
         skip = {self.index(source, "skip", name) for name in self.skipped}
@@ -166,9 +172,9 @@ class _Naming:
         raise FieldError(field_, f"names {name!r}; one of {', '.join(self.labels)} is needed", source)
 
     def _unique_names(self) -> list[str]:
-        names = [column.name or f"column {i + 1}" for i, column in enumerate(self.columns)]
+        names = [_shortened(column.name) or f"column {i + 1}" for i, column in enumerate(self.columns)]
         kept = [i for i, column in enumerate(self.columns) if not column.says_time]
-        twice = {names[i] for i in kept if [names[k] for k in kept].count(names[i]) > 1}
+        twice = {name for name, count in Counter(names[i] for i in kept).items() if count > 1}
         groups = self.layout.groups
         if twice and all(groups[i] for i in kept if names[i] in twice):
             names = [f"{groups[i]} {name}" if name in twice else name for i, name in enumerate(names)]
@@ -217,7 +223,14 @@ class _Naming:
         if options.no_times:
             self._leave_out_times(None)
             return []
-        named = [i for i in self.candidates if self.columns[i].says_time and self.labels[i] not in options.wanted]
+        said = [i for i, column in enumerate(self.columns) if column.says_time and column.name not in options.wanted]
+        named = [i for i in said if i in self.candidates]
+        # Times of columns that are left out have nothing beside them.
+        ends = dict(zip(said, [*said[1:], len(self.columns)], strict=False))
+        alone = [i for i in named if ends[i] > i + 1 and not any(i < k < ends[i] for k in self.candidates)]
+        if len(alone) < len(named):
+            named = [i for i in named if i not in alone]
+            self.candidates = [i for i in self.candidates if i not in alone]
         if len(named) > 1 and not self._side_by_side(named):
             self._one_of(source, named)
             self._leave_out_times(named[0])
@@ -245,7 +258,7 @@ class _Naming:
         for index in named:
             numbers = self._numbers(index)
             relative.append((numbers - numbers[0]) * units.TIME[_time_unit(self.columns[index], numbers)])
-        step = np.median(np.diff(relative[0])) if len(relative[0]) > 1 else 0.0
+        step = np.nanmedian(np.diff(relative[0])) if len(relative[0]) > 1 else 0.0
         if any(not np.allclose(other, relative[0], atol=0.5 * step, rtol=1e-4, equal_nan=True) for other in relative):
             listed = " or ".join(repr(self.labels[i]) for i in named)
             raise FieldError("time", f"is not clear: {listed} holds times; one of both, or no times, is needed", source)
@@ -270,6 +283,11 @@ class _Naming:
         if found:
             self.notes.append(f"times are those of {self.labels[found[0]]}, which rises evenly")
         return found
+
+
+def _shortened(name: str) -> str:
+    """A name that fits into a line."""
+    return name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME - 3]}..."
 
 
 def _time_unit(column: Column, values: FloatArray) -> str:
@@ -314,6 +332,7 @@ class _Cells:
     blank_before: bool = False
     blanks: int = 0
     short: str = ""
+    longest: int = 0
 
     def take(self, block: bytes) -> bool:
         """Add the rows of a block of lines; False if the table has ended."""
@@ -349,13 +368,14 @@ class _Cells:
             if (
                 counts[index] < len(self.layout.columns)
                 and index == len(ends) - 1
-                and (self.rows or kept[:index].any())
+                and len(text) < max(self.longest, int(np.diff(ends).max(initial=0)))
             ):
                 # The last line of a file that was cut.
                 self.short = problem
                 kept[index] = False
                 continue
             raise UserError(problem)
+        self.longest = max(self.longest, int(np.diff(ends).max(initial=0)))
         self.blank_before = bool(len(kept)) and not kept[-1]
         self.line += len(ends)
         numbers: int | npt.NDArray[np.int64] = first
@@ -417,7 +437,7 @@ class _Cells:
         self.notes.append(f"another table, from line {line} on ({describe(text.strip())}): left out")
 
     def _parsed(self, block: bytes, count: int) -> FloatArray:
-        """The numbers of a block: [rows, parsed columns]; NaN where a cell is empty or wrong."""
+        """The numbers of a block: [rows, parsed columns]; NaN if a cell is empty or wrong."""
         # Only here: pandas takes a third of a second to import.
         import pandas as pd
 
@@ -436,7 +456,7 @@ class _Cells:
         }
         values: FloatArray
         try:
-            if _TRUTH.search(block):
+            if any(word in block for word in _TRUTH):
                 # pandas takes them for numbers.
                 raise ValueError("true or false")
             frame = pd.read_csv(
@@ -533,7 +553,7 @@ def _table(source: str, encoding: str, names: _Naming, cells: _Cells) -> TextTab
         source, layout,
         tuple(Column(names.labels[i], names.columns[i].unit) for i in kept),
         values, tuple(clocks), {kept.index(i): rate for i, rate in layout.rates.items() if i in kept},
-        tuple(cells.lines), names.repeated, names.skipped,
+        tuple(cells.lines), names.nameless, names.repeated, names.skipped,
         (*_reading(encoding, layout), *names.notes, *notes, *cells.notes),
     )  # fmt: skip
 

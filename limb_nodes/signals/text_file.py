@@ -44,13 +44,17 @@ class TextFile:
         first = self._stream.read(HEAD)
         mark = next((mark for mark in _MARKS if first.startswith(mark)), b"")
         self.encoding = encoding or _encoding_of(self.source, first, mark)
+        # A wrong byte spoils one sign of most encodings, and all that follow in these.
+        self._errors = "strict" if self.encoding.lower().startswith(("utf-16", "utf-32")) else "replace"
         self._mark = len(mark)
         self._whole = len(first) < HEAD
 
     def head(self) -> list[str]:
         """The whole lines among the first bytes, without their ends. Raises UserError if a line is longer."""
         self._stream.seek(self._mark)
-        text = _plain_ends(self._stream.read(HEAD).decode(self.encoding, errors="replace"))
+        text = _plain_ends(
+            self._decoded(codecs.getincrementaldecoder(self.encoding)(self._errors), self._stream.read(HEAD))
+        )
         lines = text.split("\n")
         rest = lines.pop()
         if rest and self._whole:
@@ -65,12 +69,12 @@ class TextFile:
         Raises UserError that names the line if there is a zero byte or a line is too long.
         """
         self._stream.seek(self._mark)
-        decoder = codecs.getincrementaldecoder(self.encoding)(errors="replace")
+        decoder = codecs.getincrementaldecoder(self.encoding)(self._errors)
         plain = self.encoding.replace("-", "_") in {"utf_8", "ascii"}
         rest, line = b"", 0
         while True:
             raw = self._stream.read(BLOCK)
-            text = raw if plain else decoder.decode(raw, final=not raw).encode("utf-8", errors="replace")
+            text = raw if plain else self._decoded(decoder, raw, final=not raw).encode("utf-8", errors="replace")
             # The line feed of an end that a block cuts comes with the next one.
             text, rest = rest + text, b""
             if raw and text.endswith(b"\r"):
@@ -94,6 +98,14 @@ class TextFile:
             line += count
             if not raw:
                 return
+
+    def _decoded(self, decoder: codecs.IncrementalDecoder, raw: bytes, final: bool = False) -> str:
+        try:
+            return decoder.decode(raw, final)
+        except UnicodeError as error:
+            raise UserError(
+                f"{self.source}: is no text in {self.encoding}: {error}; another encoding is needed"
+            ) from None
 
     def close(self) -> None:
         """Close the file."""

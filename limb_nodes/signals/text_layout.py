@@ -18,14 +18,16 @@ from limb_nodes.signals import units
 from limb_nodes.signals.column import Column, column_of
 from limb_nodes.signals.text_options import DECIMALS, DELIMITERS, TextOptions
 
-MOST_COLUMNS = 10_000
+MOST_COLUMNS = 4096
 # So many rows of numbers show how all are written.
 _ENOUGH = 50
+# The rows begin within so many lines.
+_MOST_PREAMBLE = 2000
 MISSING = ("", "na", "n/a", "nan", "-nan", "null", "none", "-")
 _EXPONENT = r"(?:[eE][+-]?\d+)?"
 _NUMBERS = {
-    ".": re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)" + _EXPONENT),
-    ",": re.compile(r"[+-]?(?:\d+(?:,\d+)?|,\d+)" + _EXPONENT),
+    ".": re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)" + _EXPONENT, re.ASCII),
+    ",": re.compile(r"[+-]?(?:\d+(?:,\d+)?|,\d+)" + _EXPONENT, re.ASCII),
 }
 _INTEGER_PART = re.compile(r"[+-]?0\d")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+")
@@ -39,6 +41,8 @@ _CHANNEL = re.compile(
 _CHANNEL_RATE = re.compile(r"(?P<rate>\d+(?:\.\d+)?)\s+samples per second")
 _LABELS = re.compile(r"labels\s*:?=+\s*(.*)", re.IGNORECASE)
 _MARKS = "#%/;"
+# Remarks above the rows say what is looked for at their beginning.
+_REMARK = 1000
 
 
 @dataclass(frozen=True)
@@ -71,11 +75,15 @@ class Layout:
 
 @dataclass(frozen=True)
 class _Rows:
-    """The first rows of numbers under one reading: `width` cells each, from line `start` on; `text`: cells of text."""
+    """The first rows of numbers under one reading: `width` cells each, of lines `start` to `end`.
+
+    text: how many cells hold text.
+    """
 
     delimiter: str
     decimal: str
     start: int
+    end: int
     width: int
     cells: tuple[tuple[str, ...], ...]
     text: int
@@ -123,12 +131,16 @@ def read_layout(source: str, lines: Sequence[str], options: TextOptions) -> Layo
     above = min(options.header_row or first, len(lines))
     if options.header_row and options.header_row >= len(lines):
         raise FieldError("header_row", f"is {options.header_row}; a line above rows of numbers is needed", source)
-    readings = [
-        rows
-        for delimiter in ([sign] if sign else DELIMITERS.values())
-        for decimal in ([options.decimal] if options.decimal else DECIMALS)
-        if (rows := _rows(lines, above, delimiter, decimal))
-    ]
+    readings: list[_Rows] = []
+    some = lines[: above + _MOST_PREAMBLE]
+    for delimiter in [sign] if sign else DELIMITERS.values():
+        for decimal in [options.decimal] if options.decimal else DECIMALS:
+            rows = _rows(some, above, delimiter, decimal)
+            if rows:
+                readings.append(rows)
+                if len(rows.cells) == _ENOUGH:
+                    # Another reading has to show itself in the same lines.
+                    some = some[: rows.end]
     if not readings:
         raise UserError(_no_rows(source, lines))
     rows, names = _best(source, lines, readings, options)
@@ -139,10 +151,12 @@ def read_layout(source: str, lines: Sequence[str], options: TextOptions) -> Layo
     if names is None:
         raise UserError(_no_names(source, lines, rows))
     columns = tuple(column_of(cell, unit) for cell, unit in zip(names.cells, names.units, strict=True))
-    preamble = lines[: rows.start]
+    start = max(above, _first_row(lines, rows, names.line or 0), names.line or 0)
+    cells = rows.cells[max(0, start - rows.start) :]
+    preamble = lines[:start]
     return Layout(
-        rows.delimiter, rows.decimal, columns, names.groups, names.line, rows.start, names.rates,
-        _stated_rates(preamble, rows.delimiter), _promised(preamble), rows.cells,
+        rows.delimiter, rows.decimal, columns, names.groups, names.line, start, names.rates,
+        _stated_rates(preamble, rows.delimiter), _promised(preamble), cells,
     )  # fmt: skip
 
 
@@ -170,7 +184,7 @@ def _rows(lines: Sequence[str], first: int, delimiter: str, decimal: str) -> _Ro
     text = sum(
         bool(cell) and cell.lower() not in MISSING and not _looks(cell, decimal) for _, row in best for cell in row
     )
-    return _Rows(delimiter, decimal, best[0][0], len(best[0][1]), tuple(row for _, row in best), text)
+    return _Rows(delimiter, decimal, best[0][0], best[-1][0] + 1, len(best[0][1]), tuple(row for _, row in best), text)
 
 
 def _data(line: str, delimiter: str, decimal: str) -> tuple[str, ...] | None:
@@ -237,21 +251,46 @@ def _best(
 def _described(rows: _Rows) -> str:
     names = {sign: name for name, sign in DELIMITERS.items()}
     mark = "comma" if rows.decimal == "," else "point"
-    return f"{rows.width} columns (delimiter {names.get(rows.delimiter, rows.delimiter)}, decimal {mark})"
+    columns = f"{rows.width} column{'s' if rows.width > 1 else ''}"
+    return f"{columns} (delimiter {names.get(rows.delimiter, rows.delimiter)}, decimal {mark})"
 
 
 def _names(lines: Sequence[str], rows: _Rows, options: TextOptions) -> _Names | None:
     """The names above the rows, or None."""
     if options.header_row:
         return _names_in(lines, rows, [options.header_row - 1, *range(options.header_row, rows.start)], True)
-    channels = [match for line in lines[: rows.start] if (match := _CHANNEL.fullmatch(line.strip()))]
+    channels = [match for line in lines[: rows.start] if (match := _channel(line))]
     if channels and len(channels) <= rows.width:
         # Columns behind those that are described have no name.
         rest = ("",) * (rows.width - len(channels))
         cells = (*(match["name"] for match in channels), *rest)
         return _Names(cells, (*(match["unit"] for match in channels), *rest), ("",) * rows.width, None, {})
-    found = _names_in(lines, rows, range(rows.start - 1, -1, -1), False)
-    return found or _names_in_comments(lines, rows)
+    # A row with a wrong cell may stand between the names and the rows that show how all are written.
+    start = _first_row(lines, rows, 0)
+    found = _names_in(lines, rows, range(start - 1, -1, -1), False)
+    if found is None and start < rows.start:
+        found = _names_in(lines, rows, range(rows.start - 1, -1, -1), False)
+    found = found or _names_in_comments(lines, rows)
+    if found is None and len(rows.cells) > 1 and _may_be_names([cell for cell in rows.cells[0] if cell], rows.decimal):
+        # More channels that are numbered than columns that are named.
+        return _Names(rows.cells[0], ("",) * rows.width, ("",) * rows.width, rows.start + 1, {})
+    return found
+
+
+def _first_row(lines: Sequence[str], rows: _Rows, least: int) -> int:
+    """The first of the lines down to the rows that have as many cells, and a number among them; not below `least`."""
+    start = rows.start
+    while start > least and rows.start - start < _ENOUGH:
+        try:
+            cells = split(lines[start - 1], rows.delimiter)
+        except ValueError:
+            break
+        filled = [cell for cell in cells if cell]
+        numbers = [cell for cell in filled if number_of(cell, rows.decimal) is not None]
+        if len(cells) != rows.width or not numbers or lines[start - 1][:1] in _MARKS:
+            break
+        start -= 1
+    return start
 
 
 def _names_in(lines: Sequence[str], rows: _Rows, indexes: Iterable[int], first: bool) -> _Names | None:
@@ -286,7 +325,7 @@ def _names_in(lines: Sequence[str], rows: _Rows, indexes: Iterable[int], first: 
             stated = tuple(_unit_cell(cell) or "" for cell in fitted)
             continue
         if found is None:
-            if fitted is None or (not first and not any(number_of(cell, rows.decimal) is None for cell in filled)):
+            if fitted is None or (not first and not _may_be_names(filled, rows.decimal)):
                 break
             found = (index, fitted)
             if first:
@@ -300,15 +339,27 @@ def _names_in(lines: Sequence[str], rows: _Rows, indexes: Iterable[int], first: 
     return _Names(found[1], stated, ("",) * rows.width, found[0] + 1, rates)
 
 
+def _may_be_names(cells: Sequence[str], decimal: str) -> bool:
+    """Whether cells name columns: there is text, and no number but counts."""
+    numbers = [cell for cell in cells if number_of(cell, decimal) is not None]
+    return len(numbers) < len(cells) and all(cell.isdigit() for cell in numbers)
+
+
+def _channel(line: str) -> re.Match[str] | None:
+    """What a line says of one channel."""
+    return _CHANNEL.fullmatch(line.strip()) if len(line) < _REMARK else None
+
+
 def _says_time(cells: Sequence[str]) -> bool:
-    return any(column_of(cell).says_time and cell.lower() not in units.TIME for cell in cells)
+    named = [column_of(cell) for cell in cells]
+    return any(column.says_time and column.name and column.name.lower() not in units.TIME for column in named)
 
 
 def _header_cells(line: str, delimiter: str) -> tuple[str, ...]:
     if delimiter == " ":
         # A unit in brackets belongs to the name before it.
-        line = re.sub(r"\s+(?=[\[(])", "", line)
-        line = re.sub(r"[\[(][^\])]*[\])]", lambda match: match[0].replace(" ", ""), line)
+        line = " ".join(line.split()).replace(" [", "[").replace(" (", "(")
+        line = re.sub(r"[\[(][^\[\]()]*[\])]", lambda match: match[0].replace(" ", ""), line)
     return split(line, delimiter)
 
 
@@ -371,7 +422,7 @@ def _names_in_comments(lines: Sequence[str], rows: _Rows) -> _Names | None:
             continue
         text = line.lstrip("#% \t")
         cells: Sequence[str] | None = _json_names(text)
-        if cells is None and (match := _LABELS.match(text)):
+        if cells is None and (match := _LABELS.match(text[:_REMARK])):
             cells = re.split(r"[\t,;]|\s{2,}", match[1].strip())
         line_of_cells = cells is None
         if cells is None:
@@ -417,9 +468,9 @@ def _stated_rates(preamble: Sequence[str], delimiter: str) -> tuple[float, ...]:
         rates.update(float(rate) for rate in devices if isinstance(rate, (int, float)))
         if devices:
             continue
-        if (match := _CHANNEL.fullmatch(line.strip())) is not None:
+        if (match := _channel(line)) is not None:
             rates.update(float(rate["rate"]) for rate in [_CHANNEL_RATE.search(match[0])] if rate)
-        elif match := _STATED.search(text):
+        elif match := _STATED.search(text[:_REMARK]):
             rates.update(rate for rate in [number_of(match[1], ".")] if rate)
         else:
             rates.update(_rate_below(preamble, index, delimiter))
@@ -444,10 +495,10 @@ def _rate_below(preamble: Sequence[str], index: int, delimiter: str) -> list[flo
 
 def _promised(preamble: Sequence[str]) -> int | None:
     """How many rows the header promises."""
-    channels = [int(match["count"]) for line in preamble if (match := _CHANNEL.fullmatch(line.strip()))]
+    channels = [int(match["count"]) for line in preamble if (match := _channel(line))]
     if channels:
         return max(channels)
-    found = [int(match[1] or match[2]) for line in preamble if (match := _PROMISED.search(line))]
+    found = [int(match[1] or match[2]) for line in preamble if (match := _PROMISED.search(line[:_REMARK]))]
     return found[-1] if found and len(str(found[-1])) < 16 else None
 
 
@@ -466,6 +517,6 @@ def _no_names(source: str, lines: Sequence[str], rows: _Rows) -> str:
             "it, or header row 0 for a file without"
         )
     return (
-        f"{source}, line {rows.start + 1}: holds {rows.width} columns ({_described(rows)}), and no line above names as "
-        "many; a line of names is needed, or another delimiter, decimal mark or header row"
+        f"{source}, line {rows.start + 1}: holds {_described(rows)}, and no line above names as many; a line of names "
+        "is needed, or another delimiter, decimal mark or header row"
     )

@@ -11,7 +11,7 @@ ANGLE = {"rad": 1.0, **dict.fromkeys(("deg", "°"), math.pi / 180.0)}
 # Micro stands twice in Unicode, as a sign of its own and as a Greek letter.
 VOLTAGE = {"V": 1.0, "mV": 1e-3, "uV": 1e-6, "µV": 1e-6, "μV": 1e-6, "nV": 1e-9}
 
-_OTHERS = {"Hz", "N", "kN", "Nm", "N m", "g", "G", "m/s", "m/s2", "m/s^2", "deg/s", "rad/s", "%", "1", "bpm", "Pa"}
+_OTHERS = {"Hz", "N", "kN", "Nm", "N m", "g", "G", "m/s", "m/s2", "m/s^2", "deg/s", "rad/s", "%", "bpm", "Pa"}
 _KNOWN = frozenset({*TIME, *LENGTH, *ANGLE, *VOLTAGE, *_OTHERS} - {""})
 _PREFIXES = {"": "", "milli": "m", "micro": "u", "nano": "n", "centi": "c"}
 _WORDS = {

@@ -259,5 +259,6 @@ def test_bag_without_the_topic_says_what_there_is(raw_file, tmp_path, capsys):
     limb_emg(raw_file, "-o", tmp_path / "env", "--rate", 1000, "--no-raw")
     line = refusal(capsys, tmp_path / "env", "-o", tmp_path / "again")
     assert (
-        "no message on emg_raw; one of /emg_envelope (field activation), /reference_angle (field position) is" in line
+        "no message on emg_raw or emg; one of /emg_envelope (field activation), /reference_angle (field position) is"
+        in line
     )

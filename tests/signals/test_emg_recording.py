@@ -101,7 +101,7 @@ def test_byte_order_mark_and_latin_text_are_read(write):
             "line 5: time is 2.6; times at an even distance",
         ),
         ("RF\n" + "1" * 200_000, 1000.0, "no rows below the header"),
-        ("R" * 200_000 + "\n1", 1000.0, "line 2: holds 1 columns"),
+        ("R" * 200_000 + "\n1", 1000.0, "line 2: holds 1 column (delimiter"),
         ("RF\n1\n" + "x" * 1000, 1000.0, "xxx...; a finite number"),
         (b"RF\0\0\n", 1000.0, "is no text file"),
         (CHANNELS.replace("from 50 to 1000 samples per second", ""), None, "the header states no samples per second"),
