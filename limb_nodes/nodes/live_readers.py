@@ -35,7 +35,7 @@ class EnvelopeReader:
         names, values = message.name, message.activation
         if len(names) != len(values):
             raise ValueError(f"has {len(names)} names and {len(values)} values; as many are needed")
-        given = {**dict(zip(names, values, strict=True))}
+        given = dict(zip(names, values, strict=True))
         given.update({self._channels[name]: value for name, value in given.items() if name in self._channels})
         missing = [muscle for muscle in self._muscles if muscle not in given]
         if missing:

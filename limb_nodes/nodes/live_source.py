@@ -27,7 +27,7 @@ LONGEST_LOOK = 2 * LOOK_PERIOD
 REPORT_PERIOD = 1.0
 # How long a source may take to come (s): nodes may take seconds to find each other.
 PATIENCE = 10.0
-# The node itself subscribes with these, so that nothing is said of a quality that does not fit: it takes another then.
+# Without rclpy's warning that a quality of service does not fit: another is taken then.
 QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
 
 
