@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from tests.benchmarks import ensembles, graph, solving, starting
+from tests.benchmarks import ensembles, graph, reading, solving, starting
 from tests.benchmarks.table import Row, as_json, as_table
 
 Part = Callable[[int, float], Iterator[Row]]
@@ -22,6 +22,7 @@ PARTS: dict[str, Part] = {
     "ensemble": ensembles.ensemble,
     "graph": graph.graph,
     "start": starting.start,
+    "reading": reading.reading,
 }
 ROUNDS, QUICK_ROUNDS = 11, 2
 DURATION, QUICK_DURATION = 10.0, 0.5

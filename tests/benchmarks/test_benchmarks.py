@@ -45,6 +45,13 @@ def test_the_graph_and_the_bare_ring(tmp_path: Path) -> None:
     assert all(row["speed"] > 0.0 for row in rows)
 
 
+def test_reading_a_long_file(tmp_path: Path) -> None:
+    _, rows = benchmark(tmp_path, "--only", "reading")
+    [row] = rows
+    assert row["work"] == "text file"
+    assert row["speed"] > 0.0
+
+
 def test_an_unknown_name_is_refused(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, str(RUN), "--only", "nothing"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
