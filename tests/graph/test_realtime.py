@@ -57,9 +57,8 @@ def test_real_time_follows_the_lockstep_run(limb, waves, lockstep, bags, tmp_pat
     live, still = bags.decoded(tmp_path / "run", TOPICS), bags.decoded(lockstep(), TOPICS)
     assert outcome.ticks == 401
     np.testing.assert_array_equal(live["activation"]["activation"], still["activation"]["activation"])
-    carried = torques_carried(tmp_path / "run", limb, RATE, bags)
-    assert carried <= outcome.missed
-    differ_little(live, still, carried, RATE)
+    assert torques_carried(tmp_path / "run", limb, RATE, bags) <= outcome.missed
+    differ_little(live, still, outcome.missed)
     assert missed(tmp_path / "run") == outcome.missed
 
 
@@ -114,9 +113,8 @@ def test_a_muscle_stack_that_stands_still(rate, limb, waves, lockstep, processes
     found = bags.decoded(tmp_path / "run", (*TOPICS, "joint_torque"))
     ticks = found["joint_torque"]["tick"].tolist()
     assert ticks == list(range(round(seconds * rate) + 1)), "muscle_stack answers every tick, late ones too"
-    carried = torques_carried(tmp_path / "run", limb, rate, bags)
-    assert carried <= dynamics.missed
-    differ_little(found, still, carried, rate)
+    assert torques_carried(tmp_path / "run", limb, rate, bags) <= dynamics.missed
+    differ_little(found, still, dynamics.missed)
     with BagReader(tmp_path / "run") as bag:
         assert bag.has("/diagnostics")
 
@@ -158,7 +156,9 @@ def test_a_played_recording_moves_the_limb_as_in_lockstep(limb, lockstep, proces
     ticks = len(found["joint_states"]["position"])
     still = bags.decoded(lockstep(str(out), (ticks - 1) / rate, str(resting), rate), TOPICS)
     assert np.ptp(still["joint_states"]["position"]) > 0.1
-    differ_little(found, still, torques_carried(out, str(resting), rate, bags), rate)
+    late = int(re.search(r"deadlines  (\d+) missed", live.printed)[1])
+    assert torques_carried(out, str(resting), rate, bags) <= late
+    differ_little(found, still, late)
 
 
 def played(player: Any) -> tuple[int, float]:
@@ -188,10 +188,11 @@ def torques_carried(path: Path, limb: str, rate: float, bags: Any) -> int:
     """
     found = bags.decoded(path, ("joint_states", "joint_torque", "movement_pattern"))
     angle, velocity = found["joint_states"]["position"], found["joint_states"]["velocity"]
+    accelerations = found["movement_pattern"]["acceleration"]
     rows = np.stack([found["joint_torque"][name] for name in TORQUE_FIELDS], axis=1)
-    chain, period, carried = LimbStepper(load_limb(limb)), Ticks(rate).period, 0
-    for k, acceleration in enumerate(found["movement_pattern"]["acceleration"]):
-        np.testing.assert_array_equal((chain.angle, chain.velocity), (angle[k], velocity[k]), err_msg=f"tick {k}")
+    model, period = load_limb(limb), Ticks(rate).period
+    chain, taken, carried = LimbStepper(model), [], 0
+    for k, acceleration in enumerate(accelerations):
         for old in range(max(0, k + 1 - len(rows)), min(k, round(MOST_AHEAD * rate)) + 1):
             torque = rows[k - old].copy()
             torque[0] += (
@@ -199,22 +200,31 @@ def torques_carried(path: Path, limb: str, rate: float, bags: Any) -> int:
                 + torque[2] * (velocity[k] - velocity[k - old])
                 + torque[3] * old * period
             )
-            if np.array_equal(chain.acceleration(torque), acceleration):
+            if not np.array_equal(chain.acceleration(torque), acceleration):
+                continue
+            chain.step(torque, period)
+            if k + 1 == len(accelerations) or np.array_equal(
+                (chain.angle, chain.velocity), (angle[k + 1], velocity[k + 1])
+            ):
                 break
+            # Muscles that are slack pull alike, but differ in their slopes if they are about to pull.
+            chain = LimbStepper(model)
+            for earlier in taken:
+                chain.step(earlier, period)
         else:
             pytest.fail(f"tick {k} has moved on with a torque that is not there")
+        taken.append(torque)
         carried += old > 0
-        chain.step(torque, period)
     return carried
 
 
-def differ_little(live: Any, still: Any, carried: int, rate: float) -> None:
-    """Assert that a movement is that of the lockstep run, but for what torques that were carried can do.
+def differ_little(live: Any, still: Any, late: int) -> None:
+    """Assert that a movement is that of the lockstep run, to the last bit if no torque was late.
 
-    That is 1.7 rad/s while they were, if they were for as long as they may be and when the limb was fastest.
+    Torques that are always as late as the limb takes them, and know nothing of the next activation, make 0.27 rad.
     """
     difference = np.abs(live["joint_states"]["position"] - still["joint_states"]["position"]).max()
-    assert difference <= 3.0 * carried / rate
+    assert difference <= 0.4 * bool(late)
 
 
 def test_play_does_not_take_a_recorder_for_a_listener(processes, bench, until, bags, tmp_path):
