@@ -26,7 +26,7 @@ from limb_nodes.nodes.settings import RunSettings, checked
 LONG = "600"
 MUSCLES, JOINTS = ["flexor", "extensor"], ["joint"]
 # How many runs come to one that is in place, and how many pairs start together.
-NEWCOMERS, PAIRS = 6, 2
+NEWCOMERS, PAIRS = 4, 2
 # As many runs at a time as a test starts.
 TOGETHER = 2
 

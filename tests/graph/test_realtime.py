@@ -183,8 +183,8 @@ def missed_deadlines(told: list[DiagnosticArray]) -> list[int]:
 def torques_carried(path: Path, limb: str, rate: float, bags: Any) -> int:
     """How many ticks of a run went on with an older torque, carried along its slopes.
 
-    Asserts that each tick follows from the one before, to the last bit, with its own torque or one that is
-    `MOST_AHEAD` old at most.
+    Asserts that each tick leads to the next, to the last bit, by its own torque or by one that is younger than
+    `MOST_AHEAD`.
     """
     found = bags.decoded(path, ("joint_states", "joint_torque", "movement_pattern"))
     angle, velocity = found["joint_states"]["position"], found["joint_states"]["velocity"]
@@ -193,7 +193,7 @@ def torques_carried(path: Path, limb: str, rate: float, bags: Any) -> int:
     model, period = load_limb(limb), Ticks(rate).period
     chain, taken, carried = LimbStepper(model), [], 0
     for k, acceleration in enumerate(accelerations):
-        for old in range(max(0, k + 1 - len(rows)), min(k, round(MOST_AHEAD * rate)) + 1):
+        for old in range(max(0, k + 1 - len(rows)), min(k + 1, round(MOST_AHEAD * rate))):
             torque = rows[k - old].copy()
             torque[0] += (
                 torque[1] * (angle[k] - angle[k - old])
