@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +24,9 @@ from limb_nodes.signals.column import Column
 from limb_nodes.signals.text_file import TextFile
 from limb_nodes.signals.text_layout import MISSING, Layout, number_of, read_layout, split
 from limb_nodes.signals.text_options import TextOptions
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # So many cells of a column of numbers may hold something else; they count as missing, and are told.
 MOST_WRONG = 1e-3
@@ -316,6 +320,7 @@ class _Cells:
 
     parsed: indexes of the columns that are parsed. labels: the names of all columns.
     several: whether columns of several rates stand side by side, so that rows may end early.
+    texts: columns that are parsed as text, for a cell of them was no number.
     """
 
     source: str
@@ -325,6 +330,7 @@ class _Cells:
     several: bool
     blocks: list[FloatArray] = field(default_factory=list)
     lines: list[tuple[int, int | npt.NDArray[np.int64]]] = field(default_factory=list)
+    texts: set[int] = field(default_factory=set)
     wrong: dict[int, _Wrong] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     rows: int = 0
@@ -437,69 +443,74 @@ class _Cells:
         self.notes.append(f"another table, from line {line} on ({describe(text.strip())}): left out")
 
     def _parsed(self, block: bytes, count: int) -> FloatArray:
-        """The numbers of a block: [rows, parsed columns]; NaN if a cell is empty or wrong."""
-        # Only here: pandas takes a third of a second to import.
-        import pandas as pd
-
-        how = {
-            "sep": r"\s+" if self.layout.delimiter == " " else self.layout.delimiter,
-            "header": None,
-            "names": list(range(len(self.layout.columns))),
-            "usecols": self.parsed,
-            "index_col": False,
-            "engine": "c",
-            "skipinitialspace": True,
-            "skip_blank_lines": False,
-            "keep_default_na": False,
-            "low_memory": False,
-            "encoding_errors": "replace",
-        }
-        values: FloatArray
-        try:
-            if any(word in block for word in _TRUTH):
-                # pandas takes them for numbers.
-                raise ValueError("true or false")
-            frame = pd.read_csv(
-                io.BytesIO(block), dtype=np.float64, na_values=list(MISSING), decimal=self.layout.decimal, **how,
-                **({} if pd.__version__ >= "3.1" else {"float_precision": "round_trip"}),
-            )  # type: ignore[call-overload]  # fmt: skip
-            values = frame[self.parsed].to_numpy()
-            good = bool(np.isfinite(values).all())
-        except (ValueError, pd.errors.ParserError):
-            good = False
-        if not good:
-            try:
-                frame = pd.read_csv(io.BytesIO(block), dtype=str, na_filter=False, **how)  # type: ignore[call-overload]
-            except (ValueError, pd.errors.ParserError) as error:
-                raise UserError(
-                    f"{self.source}, line {self.place(self.rows)}: is no row of numbers: {_first(error)}"
-                ) from None
-            values = self._tolerant(frame[self.parsed].to_numpy()) if len(frame) == count else np.empty((0, 0))
-        else:
-            for column in range(len(self.parsed)):
-                self.wrong.setdefault(self.parsed[column], _Wrong()).numbers += count
-        if len(values) != count:
+        """The numbers of a block: [rows, parsed columns]; NaN where a cell is empty or wrong."""
+        # pandas takes the words of truth for numbers.
+        texts = set(self.parsed) if any(word in block for word in _TRUTH) else self.texts
+        frame = self._frame(block, texts)
+        if frame is None:
+            self.texts |= {column for column in self.parsed if self._frame(block, self.texts, [column]) is None}
+            texts = self.texts
+            frame = self._frame(block, texts)
+        if frame is None or len(frame) != count:
             raise UserError(
                 f"{self.source}, line {self.place(self.rows)} or below: a cell in quotation marks goes on in the next "
                 "line; a row in one line is needed"
             )
+        values = np.empty((count, len(self.parsed)))
+        for index, column in enumerate(self.parsed):
+            wrong = self.wrong.setdefault(column, _Wrong())
+            if column in texts:
+                values[:, index] = self._tolerant(frame[column].to_numpy(dtype=object), wrong)
+            else:
+                values[:, index] = frame[column].to_numpy()
+                wrong.numbers += int(np.isfinite(values[:, index]).sum())
         return values
 
-    def _tolerant(self, cells: npt.NDArray[np.object_]) -> FloatArray:
-        """Numbers of cells [rows, columns]; what is neither number nor missing becomes NaN and is kept in mind."""
-        values = np.full(cells.shape, np.nan)
+    def _frame(self, block: bytes, texts: set[int], columns: list[int] | None = None) -> pd.DataFrame | None:
+        """Columns of a block, numbers but for those of text; None if there is something else among the numbers."""
+        # Only here: pandas takes a third of a second to import.
+        import pandas as pd
+
+        columns = self.parsed if columns is None else columns
+        numbers = [column for column in columns if column not in texts]
+        try:
+            frame = pd.read_csv(
+                io.BytesIO(block),
+                sep=r"\s+" if self.layout.delimiter == " " else self.layout.delimiter,
+                decimal=self.layout.decimal,
+                header=None,
+                names=list(range(len(self.layout.columns))),
+                usecols=columns,
+                index_col=False,
+                dtype={column: np.float64 if column in numbers else str for column in columns},
+                na_values={column: list(MISSING) for column in numbers},
+                keep_default_na=False,
+                skipinitialspace=True,
+                skip_blank_lines=False,
+                engine="c",
+                low_memory=False,
+                encoding_errors="replace",
+                **({} if pd.__version__ >= "3.1" else {"float_precision": "round_trip"}),
+            )  # type: ignore[call-overload]
+        except (ValueError, pd.errors.ParserError):
+            return None
+        infinite = any(np.isinf(frame[column].to_numpy()).any() for column in numbers)
+        return None if infinite else frame
+
+    def _tolerant(self, cells: npt.NDArray[np.object_], wrong: _Wrong) -> FloatArray:
+        """Numbers of cells [rows]; what is neither number nor missing becomes NaN and is kept in mind."""
+        values = np.full(len(cells), np.nan)
         decimal = self.layout.decimal
-        for column in range(cells.shape[1]):
-            wrong = self.wrong.setdefault(self.parsed[column], _Wrong())
-            for row, cell in enumerate(cells[:, column]):
-                number = number_of(cell, decimal)
-                if number is not None and abs(number) < float("inf"):
-                    values[row, column] = number
-                    wrong.numbers += 1
-                elif cell.strip().lower() not in MISSING:
-                    if not wrong.count:
-                        wrong.row, wrong.text = self.rows + row, cell.strip()
-                    wrong.count += 1
+        for row, cell in enumerate(cells):
+            text = cell if isinstance(cell, str) else ""
+            number = number_of(text, decimal)
+            if number is not None and abs(number) < float("inf"):
+                values[row] = number
+                wrong.numbers += 1
+            elif text.strip().lower() not in MISSING:
+                if not wrong.count:
+                    wrong.row, wrong.text = self.rows + row, text.strip()
+                wrong.count += 1
         return values
 
 
@@ -516,10 +527,6 @@ def _starts(ends: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
 def _line(block: bytes, ends: npt.NDArray[np.int64], index: int) -> str:
     start = int(ends[index - 1]) + 1 if index else 0
     return block[start : int(ends[index])].decode("utf-8", errors="replace")
-
-
-def _first(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
 
 
 def _table(source: str, encoding: str, names: _Naming, cells: _Cells) -> TextTable:
