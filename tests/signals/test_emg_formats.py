@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from limb_nodes import cli
 from limb_nodes.errors import UserError
 from limb_nodes.signals.activation import load_activation
 from limb_nodes.signals.recording import Recording, read_recording
@@ -190,6 +192,25 @@ def test_every_file_is_in_the_table() -> None:
     folder = recorded("emg_formats")
     files = {str(path.relative_to(folder)) for path in folder.glob("*/*")}
     assert files == {*READ, *REFUSED}
+
+
+def test_a_gap_of_two_seconds_is_refused_by_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = ["emg", str(recorded("emg_formats/artefact/nan_2s.csv")), "-o"]
+    assert cli.main([*given, str(tmp_path / "refused")]) == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert "--longest-gap" in line
+    assert cli.main([*given, str(tmp_path / "kept"), "--keep-gaps"]) == 0
+
+
+def test_envelopes_at_the_edge() -> None:
+    muscles = ["RF", "BF", "VM", "ST"]
+    for name in ("negative_1e-12", "overshoot_1e-9"):
+        result = load_activation(str(recorded(f"emg_formats/envelope-edge/{name}.csv")), muscles, 100.0)
+        assert 0.0 <= result.values.min() <= result.values.max() <= 1.0
+        assert any("by rounding" in note for note in result.notes)
+    with pytest.raises(UserError, match="percent"):
+        load_activation(str(recorded("emg_formats/envelope-edge/percent.csv")), muscles, 100.0)
 
 
 def test_excitations_of_opensim_are_activations() -> None:
