@@ -443,7 +443,7 @@ class _Cells:
         self.notes.append(f"another table, from line {line} on ({describe(text.strip())}): left out")
 
     def _parsed(self, block: bytes, count: int) -> FloatArray:
-        """The numbers of a block: [rows, parsed columns]; NaN where a cell is empty or wrong."""
+        """The numbers of a block: [rows, parsed columns]; NaN if a cell is empty or wrong."""
         # pandas takes the words of truth for numbers.
         texts = set(self.parsed) if any(word in block for word in _TRUTH) else self.texts
         frame = self._frame(block, texts)
@@ -490,7 +490,11 @@ class _Cells:
                 engine="c",
                 low_memory=False,
                 encoding_errors="replace",
-                **({} if pd.__version__ >= "3.1" else {"float_precision": "round_trip"}),
+                **(
+                    {}
+                    if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1)
+                    else {"float_precision": "round_trip"}
+                ),
             )  # type: ignore[call-overload]
         except (ValueError, pd.errors.ParserError):
             return None
