@@ -26,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Band-pass, rectify, low-pass and normalise raw EMG; write the envelopes (topic emg_envelope), "
         "the raw EMG (topic emg_raw) and the angles recorded beside them (topic reference_angle) to a bag.",
     )
-    parser.add_argument("file", help="text with named columns, such as CSV, or a bag")
+    parser.add_argument("file", help="text with named columns, such as CSV, a bag, or a C3D file")
     parser.add_argument("-o", "--out", required=True, metavar="BAG", help="folder to write; must not exist")
     reading = parser.add_argument_group("what is read")
     reading.add_argument(

@@ -1,4 +1,4 @@
-"""Read raw recordings (EMG and the joint angles beside it) from text files and bags."""
+"""Read raw recordings (EMG and the joint angles beside it) from text files, bags and C3D files."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.signals import units
 from limb_nodes.signals.bag_field import BagOptions
+from limb_nodes.signals.c3d import read_c3d
 from limb_nodes.signals.clock import RATE, Fitted, fit_clock
 from limb_nodes.signals.named_values import is_bag
 from limb_nodes.signals.table import Clock, TextTable, read_table
@@ -52,11 +53,11 @@ class Recording:
 def read_recording(
     path: str | Path, *, rate: float | None = None, text: TextOptions | None = None, bag: BagOptions | None = None
 ) -> Recording:
-    """Read a recording from a text file or from a bag.
+    """Read a recording from a text file, from a bag or from a C3D file.
 
     A file is a text table (`limb_nodes.signals.table`), with or without a column of times. A bag holds its channels as
     numbers in messages, with their names (`limb_nodes.signals.bag_recording`). Times give an even clock
-    (`limb_nodes.signals.clock`).
+    (`limb_nodes.signals.clock`). Of a C3D file the analog channels are read (`limb_nodes.signals.c3d`).
 
     rate: samples per second, whatever the times say; if None, it follows from them, or from the header.
     text: how a text file is to be read. bag: what of a bag is read.
@@ -71,6 +72,9 @@ def read_recording(
         from limb_nodes.signals.bag_recording import read_bag_recording
 
         return read_bag_recording(path, rate, bag)
+    if Path(path).suffix.lower() == ".c3d":
+        names, unit_names, values, own_rate, notes = read_c3d(path)
+        return Recording(str(path), names, unit_names, values, own_rate if rate is None else rate, notes)
     return _from_table(read_table(path, text), text or TextOptions(), rate)
 
 
