@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from limb_nodes.bags.folder import refuse_existing
@@ -119,7 +120,7 @@ def add_bag_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that choose what is read from a bag."""
     group = parser.add_argument_group("how a bag is read")
     group.add_argument(
-        "--topic", help="topic of the raw EMG in a bag (default: emg_raw, or the only one with channels)"
+        "--topic", help="topic of the raw EMG in a bag (default: emg_raw, emg, or the only one with channels)"
     )
     group.add_argument("--field", metavar="PATH", help="field of the values in its messages, as in outer.inner")
     group.add_argument(
@@ -191,9 +192,10 @@ def run(args: argparse.Namespace) -> int:
     for name in bag.names:
         channels.setdefault(name, name)
     text = text_options(args, [*channels, *angles])
-    recording, *maxima = (
-        read_recording(file, rate=args.rate, text=text, bag=bag) for file in (args.file, *args.maximum_from)
-    )
+    recording = read_recording(args.file, rate=args.rate, text=text, bag=bag)
+    # What is skipped need not be in the others.
+    other = replace(text, skip=())
+    maxima = [read_recording(file, rate=args.rate, text=other, bag=bag) for file in args.maximum_from]
     options = EnvelopeOptions(
         band=None if args.no_band_pass else (args.band[0], args.band[1]),
         band_order=args.band_order,
