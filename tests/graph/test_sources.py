@@ -51,6 +51,8 @@ LATCHED = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE, durabilit
 QUALITIES = {"best effort": BEST_EFFORT, "reliable": RELIABLE, "latched": LATCHED}
 # A source is told to be silent after this by default, and at most so much later than it is (s).
 SILENCE, LATEST = 0.5, 1.0
+# Longer than what a test does meanwhile takes on a busy machine (s).
+LONG_SILENCE = 3.0
 
 
 @contextmanager
@@ -380,7 +382,7 @@ def test_a_channel_takes_the_place_of_a_muscle(made, channels):
 
 @pytest.mark.parametrize(("on_silence", "left"), [("hold", [0.25, 0.75]), ("zero", [0.0, 0.0])])
 def test_a_source_that_falls_silent_and_comes_back(on_silence, left, bench, limb, foreign, capfd):
-    live = Live(bench(), limb, on_silence=on_silence)
+    live = Live(bench(), limb, on_silence=on_silence, silence=LONG_SILENCE)
     publisher = foreign(MuscleActivation, "emg_envelope", BEST_EFFORT)
     live.first(publisher, envelope([0.25, 0.75]))
     assert live.step() == [0.25, 0.75]
@@ -396,7 +398,7 @@ def test_a_source_that_falls_silent_and_comes_back(on_silence, left, bench, limb
 
 
 def test_a_silent_source_stops_the_run_if_asked(bench, limb, foreign):
-    live = Live(bench(), limb, on_silence="stop")
+    live = Live(bench(), limb, on_silence="stop", silence=LONG_SILENCE)
     publisher = foreign(MuscleActivation, "emg_envelope", RELIABLE)
     live.first(publisher, envelope([0.25, 0.75]))
     live.step()
@@ -463,10 +465,11 @@ def test_a_pause_of_the_node_is_no_silence(bench, limb, monkeypatch):
     """What comes meanwhile waits for it."""
     live = Live(bench(), limb)
     now = live_source.time.monotonic() + 100.0
+    before = live.live.age
     monkeypatch.setattr(live_source.time, "monotonic", lambda: now)
     live.live.look()
-    assert 0.0 < live.live.age < SILENCE
-    assert not live.live.silent
+    assert 0.0 < live.live.age - before < SILENCE
+    assert live.live.silent == (live.live.age >= SILENCE)
 
 
 # Runs
@@ -484,8 +487,8 @@ class Case:
 
     @property
     def duration(self) -> str:
-        """Long enough for the source to be found late and to stop."""
-        return "8" if 0.0 < self.lasts < 8.0 else "4.5"
+        """Long enough for the source to be found late, on a busy machine too, and to stop."""
+        return "14" if 0.0 < self.lasts < 14.0 else "8"
 
 
 # The machine may be busy: those that go on to the end must not be taken for silent.
@@ -576,10 +579,9 @@ def play_beside(node: Any, case: Case) -> None:
 def test_a_source_that_never_comes(runs):
     run = runs["never"]
     assert run.status == 3
-    first = run.reports[0]
-    assert first["input"] == "never came"
-    assert SILENCE <= float(first["age"]) <= LATEST
-    assert "emg_envelope: nothing has come in 0.5" in run.said
+    assert run.reports[0]["input"] == "never came"
+    assert first_silence(run) <= LATEST
+    assert re.search(r"emg_envelope: nothing has come in 0\.[56]", run.said)
     assert re.fullmatch(r"emg_envelope: nothing has come in [\d.]+ s; nobody publishes it", run.live)
     assert run.reports[-1]["messages"] == "0"
 
@@ -602,7 +604,7 @@ def test_a_source_that_stops(name, left, runs):
     assert run.status == 3
     first = next(report for report in run.reports if report["input"] == "silent")
     assert SILENCE <= float(first["age"]) <= LATEST
-    assert "emg_envelope: stopped 0.5" in run.said
+    assert re.search(r"emg_envelope: stopped 0\.[56]", run.said)
     assert re.fullmatch(r"emg_envelope: stopped [\d.]+ s ago; (\d+) of \1 messages used", run.live)
     assert run.reports[-1]["input"] == "silent"
     assert last_activation(run) == left
@@ -610,6 +612,11 @@ def test_a_source_that_stops(name, left, runs):
     if name == "stops_stop":
         ticks = int(re.findall(r"^ticks +(\d+)", run.printed)[0])
         assert ticks < 300 * RATE
+
+
+def first_silence(run: Run) -> float:
+    """The age (s) with which a source was first told to be silent; what is told every second may come before."""
+    return next(age for age in (float(report.get("age", 0.0)) for report in run.reports) if age >= SILENCE)
 
 
 def last_activation(run: Run) -> list[float]:
@@ -621,10 +628,10 @@ def test_a_source_with_other_names(runs):
     run = runs["names"]
     assert run.status == 3
     expected = "emg_envelope: has left, right; flexor, extensor, muscles of the limb, are needed too"
-    assert expected in run.reports[0]["message"]
+    assert any(expected in report["message"] for report in run.reports)
     assert expected in run.said
-    told = next(report for report in run.reports if report.get("input") == "never came")
-    assert SILENCE <= float(told["age"]) <= LATEST
+    assert "never came" in [report.get("input") for report in run.reports]
+    assert first_silence(run) <= LATEST
     assert "no message that can be used" in run.live
     assert "left, right" in run.live
     assert "0 of" in run.live
@@ -635,5 +642,5 @@ def test_a_source_without_stamps(runs):
     run = runs["unstamped"]
     assert run.status == 0
     assert "emg_envelope: stamps are 0" in run.said
-    assert int(run.reports[0]["unstamped"]) == 1, "told with the first"
+    assert next(count for report in run.reports if (count := int(report["unstamped"]))) == 1, "told with the first"
     assert re.search(r"stamps are 0 in \d+ messages", run.live)
