@@ -14,7 +14,7 @@ RAW_TOPICS = ("emg_raw", "emg")
 
 
 def read_bag_recording(path: str | Path, rate: float | None = None, options: BagOptions | None = None) -> Recording:
-    """Read a recording from the topic `emg_raw` of a bag, or the field that the options name.
+    """Read a recording from the topics `emg_raw` or `emg` of a bag, or the field that the options name.
 
     rate: samples per second (Hz), whatever the times say; None takes what they say.
 

@@ -7,13 +7,13 @@ import io
 import struct
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.signals.column import numbered
 from limb_nodes.signals.units import unit_named
 
 # A header may promise more than a cut file holds, but not so many times its size, or the least of these bytes.
@@ -57,7 +57,7 @@ def read_c3d(path: str | Path) -> tuple[tuple[str, ...], tuple[str, ...], FloatA
     names = [label.strip() or f"analog {index + 1}" for index, label in enumerate(_as_many(labels, count))]
     stated = [unit_named(unit) or unit.strip() for unit in _as_many(unit_names, count)]
     notes = (f"the header promises {promised} values, {len(values)} are there",) if promised > len(values) else ()
-    return _numbered(names), tuple(stated), values, rate, notes
+    return tuple(numbered(names)), tuple(stated), values, rate, notes
 
 
 def _promised(file: Path) -> int:
@@ -97,13 +97,3 @@ def _channels(file: Path) -> tuple[FloatArray, list[str], list[str], float]:
 def _as_many(texts: list[str], count: int) -> list[str]:
     """So many texts; those that are not there are empty."""
     return (texts + [""] * count)[:count]
-
-
-def _numbered(names: list[str]) -> tuple[str, ...]:
-    """The names, those that come again with a number behind."""
-    seen: Counter[str] = Counter()
-    numbered = []
-    for name in names:
-        seen[name] += 1
-        numbered.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
-    return tuple(numbered)

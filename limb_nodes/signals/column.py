@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from limb_nodes.signals import units
@@ -103,3 +105,18 @@ def _split(cell: str) -> tuple[str, str]:
         if unit is not None and (unit in _SUFFIXES or of_time or "," in cell or "/" in cell):
             return match["name"].rstrip(), unit
     return cell, ""
+
+
+def numbered(names: Sequence[str]) -> list[str]:
+    """The names, all different: one that comes again has a number behind, as in `EMG (2)`."""
+    taken, seen = set(names), Counter[str]()
+    labels: list[str] = []
+    for name in names:
+        seen[name] += 1
+        label, number = name, seen[name]
+        if number > 1:
+            while (label := f"{name} ({number})") in taken:
+                number += 1
+        taken.add(label)
+        labels.append(label)
+    return labels

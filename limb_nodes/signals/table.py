@@ -20,7 +20,7 @@ from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.section import describe
 from limb_nodes.signals import units
-from limb_nodes.signals.column import Column
+from limb_nodes.signals.column import Column, numbered
 from limb_nodes.signals.text_file import TextFile
 from limb_nodes.signals.text_layout import MISSING, Layout, number_of, read_layout, split
 from limb_nodes.signals.text_options import TextOptions
@@ -182,16 +182,12 @@ class _Naming:
         groups = self.layout.groups
         if twice and all(groups[i] for i in kept if names[i] in twice):
             names = [f"{groups[i]} {name}" if name in twice else name for i, name in enumerate(names)]
-        seen: dict[str, int] = {}
-        labels = []
-        for name in names:
-            seen[name] = seen.get(name, 0) + 1
-            labels.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+        seen = Counter(names)
         again = sorted({name for i, name in enumerate(names) if i in kept and seen[name] > 1})
         if again:
             self.repeated = tuple(again)
             self.notes += [f"{seen[name]} columns are named {name}: {name}, {name} (2) ..." for name in again]
-        return labels
+        return numbered(names)
 
     def _units(self, source: str, options: TextOptions) -> None:
         for name, text in options.units.items():

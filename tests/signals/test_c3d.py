@@ -10,6 +10,7 @@ import pytest
 
 from limb_nodes import cli
 from limb_nodes.errors import UserError
+from limb_nodes.signals.column import numbered
 from limb_nodes.signals.recording import read_recording
 
 ezc3d = pytest.importorskip("ezc3d")
@@ -59,6 +60,11 @@ def test_equal_and_missing_names(tmp_path):
     recording = read_recording(path)
     assert recording.names == ("EMG", "EMG (2)", "analog 3", "knee")
     assert recording.units[2] == ""
+
+
+def test_a_number_that_a_name_has_already_is_passed_over():
+    assert numbered(["EMG", "EMG", "EMG (2)", "EMG"]) == ["EMG", "EMG (3)", "EMG (2)", "EMG (4)"]
+    assert numbered(["a", "b", "a", "a"]) == ["a", "b", "a (2)", "a (3)"]
 
 
 def test_the_command_takes_emg_and_angles_and_names_the_rest(tmp_path, capsys):
