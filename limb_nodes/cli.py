@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UserError as error:
         line = error.line(options.get(error.field, error.field)) if isinstance(error, FieldError) else str(error)
         print(f"limb: error: {line}", file=sys.stderr)
-        return 2
+        return error.status
     except KeyboardInterrupt:
         print("limb: interrupted", file=sys.stderr)
         return 130

@@ -7,8 +7,19 @@ class UserError(Exception):
     """A mistake in what the user gave; its text is the one line that the user sees.
 
     The line names file, place and value, and says what is needed: `FILE: KEY is VALUE; WHAT is needed`. Commands and
-    nodes print it to standard error and end with exit status 2.
+    nodes print it to standard error and end with `status`: 2, nothing was begun.
     """
+
+    status = 2
+
+
+class RunError(UserError):
+    """What had begun and could not be finished, such as a run whose disk is full: status 1.
+
+    What was there before, and what was made until then, is kept.
+    """
+
+    status = 1
 
 
 class FieldError(UserError):

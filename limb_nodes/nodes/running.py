@@ -93,7 +93,7 @@ def run_node(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
         return 0
     except UserError as error:
         print(f"limb: error: {error}", file=sys.stderr)
-        return 2
+        return error.status
     except KeyboardInterrupt:
         return 0
     finally:
