@@ -21,8 +21,9 @@ BELOW: dict[str, set[str]] = {
     "bags": {"foundation.arrays"},
     "signals": {"foundation", "bags"},
     "analysis": SCIENCE,
-    "nodes": SCIENCE,
-    "commands": {*SCIENCE, "analysis", "nodes"},
+    "exchange": SCIENCE,
+    "nodes": {*SCIENCE, "exchange"},
+    "commands": {*SCIENCE, "analysis", "exchange", "nodes"},
     "cli": {"commands"},
 }
 WITH_ROS = {"nodes"}

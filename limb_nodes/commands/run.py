@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from limb_nodes.foundation.parameter import Parameter
-    from limb_nodes.nodes.base import STATES
+    from limb_nodes.foundation.topics import STATES
     from limb_nodes.nodes.live_settings import LiveSettings
     from limb_nodes.nodes.session import run_in_one_process, run_in_processes
     from limb_nodes.nodes.settings import RunSettings, checked

@@ -112,7 +112,7 @@ def solve_graph(case: Case, limb: Limb) -> Trajectory:
     """Run a case by the nodes, in one process, into a bag that lives as long as this takes."""
     from limb_nodes.analysis.trajectory import trajectory_of_bag
     from limb_nodes.analysis.verification import RATE
-    from limb_nodes.nodes.base import STATES
+    from limb_nodes.foundation.topics import STATES
     from limb_nodes.nodes.session import run_in_one_process
     from limb_nodes.nodes.settings import RunSettings
     from limb_nodes.solve.whole import SolveError

@@ -23,3 +23,18 @@ TOPIC_TYPES: dict[str, str] = {
 
 LATCHED_TOPICS = frozenset({"robot_description", "joint_states"})
 """Topics whose newest message a late subscriber still gets (transient-local)."""
+
+NODES = ("activation_input", "muscle_stack", "limb_dynamics", "recorder")
+"""The nodes of a run."""
+
+STATES = ("muscle_state", "motor_unit_state", "sarcomere_state")
+"""Topics that muscle_stack sends on request."""
+
+SENDERS = {
+    "activation": "activation_input",
+    "joint_states": "limb_dynamics",
+    "joint_torque": "muscle_stack",
+    "movement_pattern": "limb_dynamics",
+    **dict.fromkeys(STATES, "muscle_stack"),
+}
+"""Topic with a message for each tick -> the node that sends it."""

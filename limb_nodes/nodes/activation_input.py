@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
-from limb_msgs.msg import MuscleActivation
-from sensor_msgs.msg import JointState
 
 from limb_nodes.errors import FieldError, UserError
+from limb_nodes.exchange.activations import ActivationPart
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.nodes.base import LimbNode
 from limb_nodes.nodes.live_readers import reader
 from limb_nodes.nodes.live_settings import EMG_RATE, ON_SILENCE, SILENCE, LiveSettings
 from limb_nodes.nodes.live_source import LiveSource
 from limb_nodes.nodes.running import main_of
-from limb_nodes.nodes.wire import Incoming
 from limb_nodes.signals.activation import Activation, load_activation
-
-# How long before the last tick a run that is stopped tells which it is (s).
-NOTICE = 0.2
 
 
 class ActivationInput(LimbNode):
@@ -28,6 +24,8 @@ class ActivationInput(LimbNode):
     Subscribes `joint_states` and, without a source, `emg_envelope` or `emg`; publishes `activation`, and how the live
     source does on `/diagnostics`.
     """
+
+    part: ActivationPart
 
     def __init__(self, **options: Any) -> None:
         super().__init__("activation_input", **options)
@@ -41,11 +39,11 @@ class ActivationInput(LimbNode):
         self.on_silence = settings.on_silence
         self.source: Activation | None = None
         self.live: LiveSource | None = None
-        self.final: int | None = None
+        final: int | None = None
         self.muscles = self.limb.muscle_names
         if source:
             self.source = load_activation(source, self.muscles, self.ticks.rate, duration or None)
-            self.final = len(self.source.values) - 1
+            final = len(self.source.values) - 1
             for note in self.source.notes:
                 self.get_logger().info(note)
         elif self.mode == "lockstep":
@@ -59,19 +57,12 @@ class ActivationInput(LimbNode):
                     f"activation_input: the parameter duration is {duration:g}; 0, or at least one tick of "
                     f"{self.ticks.period:g} s is needed"
                 )
-            self.final = round(duration * self.ticks.rate) if duration else None
+            final = round(duration * self.ticks.rate) if duration else None
             self.live = self.live_source(settings)
-        self.sent = -1
-        example = MuscleActivation(
-            last_tick=-1 if self.final is None else self.final,
-            name=self.muscles,
-            activation=[0.0] * len(self.muscles),
-        )
-        self.activation = self.outgoing("activation", example)
-        self.joint_states = Incoming(JointState, "name", self.ticks.nanoseconds)
-        zeros = [0.0] * len(self.limb.joint_names)
-        self.joint_states.expect(JointState(name=self.limb.joint_names, position=zeros, velocity=zeros))
-        self.listen_to_run(JointState, "joint_states", self.on_joint_states)
+        part = ActivationPart(**self.common, values_at=self.values_at, final=final)
+        if self.live is not None:
+            part.before = partial(self.look_at_source, self.live)
+        self.carry(part)
 
     def live_settings(self) -> LiveSettings:
         """The parameters of live input."""
@@ -112,6 +103,17 @@ class ActivationInput(LimbNode):
         except FieldError as error:
             raise UserError(f"activation_input: {error.line(f'the parameter {error.field}')}") from None
 
+    def values_at(self, tick: int) -> FloatArray:
+        """The activations [muscles] of a tick: of a live source those that it gives now."""
+        if self.live is None:
+            assert self.source is not None
+            values: FloatArray = self.source.values[tick]
+            return values
+        if tick == self.part.final:
+            # Before the message with which the recording ends.
+            self.tell_of_source(self.live)
+        return self.newest
+
     @property
     def newest(self) -> FloatArray:
         """The activations [muscles] that a live source gives now."""
@@ -120,32 +122,14 @@ class ActivationInput(LimbNode):
             return np.zeros(len(self.muscles))
         return self.live.values
 
-    def on_joint_states(self, data: bytes) -> None:
-        """Send what the tick of the message and the next one need."""
-        now = self.joint_states.read(data)
-        last = now + 1
-        if self.live is not None:
-            if self.live.subscription is None and now > 0:
-                # Not before the limb moves, so that who waits for a listener starts together with the limb.
-                self.live.open()
-            if self.live.gone and self.on_silence == "stop" and not self.live.closed:
-                self.live.closed = True
-                # The limb may be ahead by some ticks; all nodes must hear in time which is the last.
-                following = last + 1 + round(NOTICE * self.ticks.rate)
-                self.final = following if self.final is None else min(self.final, following)
-                self.activation.values["last_tick"][...] = self.final
-        if self.final is not None and last >= self.final:
-            last = self.final
-            # Only the final tick itself tells that muscle_stack has taken all activations before it.
-            self.finished = now >= self.final
-            if self.live is not None and self.sent < self.final:
-                # Before the message with which the recording ends.
-                self.tell_of_source(self.live)
-        for tick in range(self.sent + 1, last + 1):
-            values = self.activation.values
-            values["activation"][:] = self.newest if self.source is None else self.source.values[tick]
-            self.activation.publish(tick)
-        self.sent = max(self.sent, last)
+    def look_at_source(self, live: LiveSource, tick: int) -> None:
+        """Open a live source once the limb moves, and end the run with it if it is to be."""
+        if live.subscription is None and tick > 0:
+            # Not before, so that who waits for a listener starts together with the limb.
+            live.open()
+        if live.gone and self.on_silence == "stop" and not live.closed:
+            live.closed = True
+            self.part.end_soon()
 
     def tell_of_source(self, live: LiveSource) -> None:
         """Tell how the live source did until now."""
@@ -155,7 +139,7 @@ class ActivationInput(LimbNode):
 
     def destroy_node(self) -> None:
         """Tell how the live source did if the run is ended before its last tick."""
-        if self.live is not None and not self.finished:
+        if self.live is not None and hasattr(self, "part") and not self.part.finished:
             self.tell_of_source(self.live)
         super().destroy_node()
 

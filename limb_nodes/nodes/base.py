@@ -1,49 +1,50 @@
-"""What every node of the limb has: parameters with ranges, its limb, and a count of bad input."""
+"""What every node of the limb has: parameters with ranges, its limb, its part of the run, and a watch over it."""
 
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 
-from limb_nodes.errors import UserError
+from limb_nodes.errors import RunError, UserError
+from limb_nodes.exchange.identity import FORM, is_identity
+from limb_nodes.exchange.part import Part
+from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.exchange.watch import LOOK_PERIOD, Watch
 from limb_nodes.model import Limb, load_limb
 from limb_nodes.nodes.distribution import given_parameters
-from limb_nodes.nodes.identity import FORM, FRAME, frame_of, identity_of, is_identity
+from limb_nodes.nodes.messages import class_of
 from limb_nodes.nodes.qos import LIVE, STREAM
-from limb_nodes.nodes.ticks import Ticks
-from limb_nodes.nodes.wire import Outgoing
 
 MODES = ("lockstep", "realtime")
-NODES = ("activation_input", "muscle_stack", "limb_dynamics", "recorder")
-# Topics that muscle_stack publishes on request.
-STATES = ("muscle_state", "motor_unit_state", "sarcomere_state")
+# The variable by which a run tells the nodes in processes of their own whose children they are: they end with it.
+PARENT = "LIMB_RUN_PARENT"
+# How long a node that a person has started waits for the others without a word (s).
+UNSAID = 10.0
 
 
 class LimbNode(Node):
     """A node of one limb at one rate.
 
-    identity: of the run that the node belongs to; empty until it is known. finished: whether the node has done its
-    part of the run. failure: why it cannot go on, for whoever spins it; a text, because an error would keep the node
-    and all that it knows alive. bad_input: messages that could not be used.
+    part: what it does in a run. failure: why it cannot go on, and the exit status, for whoever spins it; a text,
+    because an error would keep the node and all that it knows alive.
     """
+
+    part: Part
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
-        self.identity = ""
-        self._frame = b""
-        self._outgoing: list[Outgoing] = []
-        self.finished = False
-        self.failure = ""
-        self.bad_input = 0
+        self.failure: tuple[str, type[UserError]] | None = None
         self._last_complaint = -math.inf
         self._told = 0
         self.diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", LIVE)
@@ -56,50 +57,54 @@ class LimbNode(Node):
         self.given_identity = self.text(
             "identity", "", f"identity of the run, {FORM}; empty: a new one (limb_dynamics), that of the run (others)"
         )
-        if self.given_identity:
-            if not is_identity(self.given_identity):
-                raise UserError(f"{name}: the parameter identity is {self.given_identity!r}; {FORM} are needed")
-            self.join(self.given_identity)
+        if self.given_identity and not is_identity(self.given_identity):
+            raise UserError(f"{name}: the parameter identity is {self.given_identity!r}; {FORM} are needed")
+        limit = self.number("stall_limit", 30.0, "end the run if no tick has come for so long, s", 1.0, 1e9)
+        self.watch = Watch(limit, math.inf if PARENT in os.environ else UNSAID)
 
-    def join(self, identity: str) -> None:
-        """Belong to a run from now on."""
-        self.identity, self._frame = identity, frame_of(identity)
-        for messages in self._outgoing:
-            messages.identify(self._frame)
+    @property
+    def finished(self) -> bool:
+        """Whether the node has done its part of the run."""
+        return self.part.finished
 
-    def owns(self, data: bytes) -> bool:
-        """Whether a serialised message belongs to the node's run.
+    @property
+    def common(self) -> dict[str, Any]:
+        """What every part is made with."""
+        realtime = self.mode == "realtime"
+        return {"limb": self.limb, "ticks": self.ticks, "identity": self.given_identity, "realtime": realtime}
 
-        A node without a run joins that of the first message that it asks about.
-        """
-        frame = data[FRAME]
-        if frame == self._frame:
-            return True
-        identity = identity_of(frame)
-        if identity and not self.identity:
-            self.join(identity)
-            return True
-        if not identity:
-            self.complain("a message has no identity of a run in header.frame_id")
-        return False
+    def carry(self, part: Part, listen: bool = True) -> None:
+        """Publish what a part sends, and watch over it; listen: hand it what it takes, too."""
+        self.part = part
+        part.complain = self.complain
+        for topic, messages in part.outgoing.items():
+            messages.send = self.create_publisher(class_of(topic), topic, STREAM).publish
+        for topic in part.streams if listen else ():
 
-    def outgoing(self, topic: str, example: Any) -> Outgoing:
-        """The messages of the run that the node publishes on a topic, all like an example."""
-        publisher = self.create_publisher(type(example), topic, STREAM)
-        messages = Outgoing(publisher, example, self.ticks.nanoseconds)
-        if self.identity:
-            messages.identify(self._frame)
-        self._outgoing.append(messages)
-        return messages
+            def receive(data: bytes, topic: str = topic) -> None:
+                part.receive(topic, data)
 
-    def listen_to_run(self, kind: type, topic: str, callback: Callable[[bytes], None]) -> None:
-        """Subscribe a topic of the run; the callback gets serialised messages, of this run alone."""
+            self.listen(class_of(topic), topic, receive, STREAM, raw=True)
+        self.create_timer(LOOK_PERIOD, self.on_look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-        def own(data: bytes) -> None:
-            if self.owns(data):
-                callback(data)
+    def on_look(self) -> None:
+        """Say what the part waits for if nothing goes on, and give up at last."""
+        part, watch = self.part, self.watch
+        if said := watch.look(time.monotonic(), part.done, part.awaited()):
+            self.get_logger().warning(said)
+            self.diagnose(said, bad=True, waited=f"{watch.waited:.1f}")
+        if watch.given_up:
+            self.fail(RunError(f"{self.get_name()} has waited {watch.waited:.0f} s for {part.awaited()}"))
 
-        self.listen(kind, topic, own, STREAM, raw=True)
+    def fail(self, error: UserError) -> None:
+        """Let whoever spins the node know that it cannot go on."""
+        self.failure = self.failure or (str(error), type(error))
+
+    def raise_failure(self) -> None:
+        """Raise why the node cannot go on, if it cannot."""
+        if self.failure:
+            text, kind = self.failure
+            raise RunError(text) if issubclass(kind, RunError) else UserError(text)
 
     def text(self, name: str, default: str, meaning: str) -> str:
         """A parameter that holds a text, fixed at the start."""
@@ -149,23 +154,27 @@ class LimbNode(Node):
             raise UserError(f"{self.get_name()}: the parameter {name} {value}; {allowed} is needed") from None
 
     def complain(self, what: str) -> None:
-        """Count a message that cannot be used, and say so once per second at most."""
-        self.bad_input += 1
+        """Say what is wrong with a message that is not taken, once per second at most."""
         now = time.monotonic()
         if now - self._last_complaint >= 1.0:
             self._last_complaint = now
-            self.get_logger().warning(f"{what}; kept the last good value ({self.bad_input} so far)")
+            self.get_logger().warning(f"{what}; it is not taken ({self.refused} so far)")
             self.diagnose(what, bad=True)
+
+    @property
+    def refused(self) -> int:
+        """How many messages have not been taken."""
+        return self.part.bad_input + self.part.foreign
 
     def diagnose(self, message: str, bad: bool, **values: object) -> None:
         """Publish on `/diagnostics` how the node does."""
-        self._told = self.bad_input
+        self._told = self.refused
+        counts = {name: getattr(self.part, name) for name in ("bad_input", "foreign", "conflicts")}
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if bad else DiagnosticStatus.OK,
             name=self.get_fully_qualified_name(),
             message=message,
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()]
-            + [KeyValue(key="bad_input", value=str(self.bad_input))],
+            values=[KeyValue(key=key, value=str(value)) for key, value in {**values, **counts}.items()],
         )
         stamp = self.get_clock().now().to_msg()
         self.diagnostics.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
@@ -177,12 +186,12 @@ class LimbNode(Node):
             try:
                 callback(message)
             except UserError as error:
-                self.failure = self.failure or str(error)
+                self.fail(error)
 
         return self.create_subscription(kind, topic, guarded, qos, **options)
 
     def destroy_node(self) -> None:
-        """Tell the last count of bad input."""
-        if self.bad_input > self._told:
-            self.diagnose(f"{self.bad_input} messages could not be used", bad=True)
+        """Tell the last count of messages that were not taken."""
+        if hasattr(self, "part") and self.refused > self._told:
+            self.diagnose(f"{self.refused} messages could not be used", bad=True)
         super().destroy_node()

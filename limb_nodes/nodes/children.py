@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Mapping
 
 from limb_nodes.errors import UserError
-from limb_nodes.nodes.running import PARENT
+from limb_nodes.nodes.base import PARENT
 from limb_nodes.nodes.settings import RunSettings
 
 # How long a node may take to end when asked to (s): a recorder may have much to write.

@@ -13,8 +13,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from limb_nodes.nodes.live_readers import EnvelopeReader, RawReader
 from limb_nodes.nodes.live_settings import HEARD, NEVER_CAME, SILENT
+from limb_nodes.nodes.messages import type_name
 from limb_nodes.nodes.qos import BEST_EFFORT, EVERY
-from limb_nodes.nodes.wire import type_name
 
 if TYPE_CHECKING:
     from limb_nodes.nodes.base import LimbNode
@@ -143,7 +143,7 @@ class LiveSource:
             self.values = self._reader.read(message)
         except ValueError as problem:
             self._problem = str(problem)
-            self._node.complain(f"{self._topic}: {problem}")
+            self._node.part.refuse(f"{self._topic}: {problem}")
             return
         self.used += 1
         self._problem = ""

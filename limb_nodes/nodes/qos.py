@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-# How many ticks the limb may be ahead of the recorder, and how many each topic keeps: what the
-# recorder has not taken yet is still there, and a node that starts late gets the first ticks too.
-RECORDER_LAG = 256
-HISTORY = 2 * RECORDER_LAG
+from limb_nodes.exchange.stream import HISTORY
 
 STREAM = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,

@@ -3,54 +3,38 @@
 from __future__ import annotations
 
 import math
-import struct
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
-from limb_msgs.msg import (
-    JointTorque,
-    MotorUnitState,
-    MovementPattern,
-    MuscleActivation,
-    MuscleState,
-    SarcomereState,
-)
+from limb_msgs.msg import MuscleActivation
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header, String
 
 from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.bags.versions import versions
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
-from limb_nodes.foundation.topics import LATCHED_TOPICS, TOPIC_TYPES
+from limb_nodes.exchange.identity import is_identity
+from limb_nodes.exchange.recording import RecordingPart
+from limb_nodes.foundation.topics import LATCHED_TOPICS, NODES, SENDERS, TOPIC_TYPES
 from limb_nodes.model import user_sources
-from limb_nodes.nodes.base import NODES, STATES, LimbNode
+from limb_nodes.nodes.base import LimbNode
 from limb_nodes.nodes.distribution import parameter_values, taken
 from limb_nodes.nodes.live_source import LOOK_PERIOD, QUIET, quality_for
+from limb_nodes.nodes.messages import class_of, stamp_at
 from limb_nodes.nodes.qos import BEST_EFFORT, EVERY, LATCHED, STREAM
 from limb_nodes.nodes.running import main_of
-from limb_nodes.nodes.wire import stamp_of
 
-TICKED = {
-    "activation": MuscleActivation,
-    "joint_states": JointState,
-    "joint_torque": JointTorque,
-    "movement_pattern": MovementPattern,
-    "muscle_state": MuscleState,
-    "motor_unit_state": MotorUnitState,
-    "sarcomere_state": SarcomereState,
-}
 # Of sources, which may offer best effort alone.
 SOURCES = {"emg": Float64MultiArray, "emg_envelope": MuscleActivation}
 OTHERS = {**SOURCES, "external_load": WrenchStamped, "/diagnostics": DiagnosticArray}
@@ -69,6 +53,8 @@ class Recorder(LimbNode):
     tick that it has on every topic. Finished when the last tick of the run is in the bag on every topic.
     """
 
+    part: RecordingPart
+
     def __init__(self, **options: Any) -> None:
         super().__init__("recorder", **options)
         out = self.text("out", "", "folder of the bag, which must not exist")
@@ -78,11 +64,8 @@ class Recorder(LimbNode):
         self.path = out
         refuse_existing(Path(out))
         self.writer: BagWriter | None = None
-        self.buffer: list[tuple[str, list[tuple[int, bytes]]]] = []
-        self.newest = dict.fromkeys(TICKED, -1)
-        self.counts = dict.fromkeys(TICKED, 0)
-        self.expected = {topic: 1 for topic in TICKED if topic not in STATES}
-        self.last_tick = -1
+        # What has come before the bag is open.
+        self.early: dict[str, list[bytes]] = {topic: [] for topic in (*SENDERS, *OTHERS)}
         self.announced = -2
         self.parameters: dict[str, dict[str, Any]] = {"recorder": parameter_values(self)}
         self.askers: dict[str, AsyncParameterClient] = {}
@@ -90,7 +73,7 @@ class Recorder(LimbNode):
         self.first_message: float | None = None
         self.progress = self.create_publisher(Header, "recorder_progress", LATCHED)
         self.ticked = {
-            topic: self.create_subscription(kind, topic, refuse, STREAM, raw=True) for topic, kind in TICKED.items()
+            topic: self.create_subscription(class_of(topic), topic, refuse, STREAM, raw=True) for topic in SENDERS
         }
         self.others = {
             topic: self.create_subscription(
@@ -102,7 +85,8 @@ class Recorder(LimbNode):
         self.create_timer(POLL_PERIOD, self.on_poll, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.description: str | None = None
         self.listen(String, "robot_description", self.on_description, LATCHED)
-        if not self.identity:
+        self.carry(RecordingPart(**self.common), listen=False)
+        if not self.part.identity:
             self.listen(Header, "run_identity", self.on_claim, STREAM)
         self.asking = self.create_timer(0.05, self.ask)
 
@@ -119,8 +103,8 @@ class Recorder(LimbNode):
 
     def on_claim(self, claim: Header) -> None:
         """Without an identity of its own, record the run that was heard of last, until its first message is there."""
-        if claim.frame_id != self.identity and self.first_message is None:
-            self.join(claim.frame_id)
+        if claim.frame_id != self.part.identity and self.first_message is None and is_identity(claim.frame_id):
+            self.part.join(claim.frame_id)
             self.announced = -2
             self.announce()
 
@@ -151,7 +135,7 @@ class Recorder(LimbNode):
             try:
                 self.open()
             except UserError as error:
-                self.failure = str(error)
+                self.fail(error)
 
     def on_names(self, node: str, client: AsyncParameterClient, future: Any) -> None:
         """Ask for the values of a node's parameters."""
@@ -163,21 +147,15 @@ class Recorder(LimbNode):
         values = [parameter_value_to_python(value) for value in future.result().values]
         parameters = dict(zip(names, values, strict=True))
         # If a node of another run has answered, the node is asked again.
-        if parameters.get("identity") in (self.given_identity, self.identity):
+        if parameters.get("identity") in (self.given_identity, self.part.identity):
             self.parameters[node] = parameters
 
     def open(self) -> None:
         """Make the bag, write what has come so far, and say that the run may start."""
-        muscle_stack = self.parameters.get("muscle_stack", {})
-        for topic in STATES:
-            if muscle_stack.get(f"publish_{topic}", True):
-                self.expected[topic] = int(muscle_stack.get("state_every", 1))
+        self.part.expect_states(self.parameters.get("muscle_stack", {}))
         self.writer = BagWriter(self.path, self.run_info(), namespace=self.get_namespace(), latched=LATCHED_TOPICS)
         reports = ("/diagnostics",) if self.mode == "realtime" else ()
-        self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.expected, *reports)})
-        for topic, messages in self.buffer:
-            self.writer.write_many(topic, messages, TOPIC_TYPES[topic])
-        self.buffer.clear()
+        self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.part.expected, *reports)})
         if self.description is not None:
             self.write("robot_description", 0, String(data=self.description))
         self.announce()
@@ -213,71 +191,48 @@ class Recorder(LimbNode):
         try:
             self.poll()
         except UserError as error:
-            self.failure = self.failure or str(error)
+            self.fail(error)
 
     def poll(self) -> None:
         """Write what has come on every topic, and say how far the ticks are complete."""
-        for topic, subscription in self.ticked.items():
-            messages = self.new_ticks(topic, taken(subscription))
-            if not messages:
-                continue
-            if self.first_message is None:
-                self.first_message = time.monotonic()
-            if topic == "joint_torque":
-                self.last_tick = last_tick(messages[-1][1])
-            self.counts[topic] += len(messages)
-            self.put(topic, messages)
-        # After the ticks: what a node says before its last one is there when that one is.
-        now = max(0, self.newest["joint_states"]) * self.ticks.nanoseconds
-        for topic, subscription in self.others.items():
-            if messages := [(now, data) for data in taken(subscription)]:
-                self.put(topic, messages)
-        self.announce()
-
-    def new_ticks(self, topic: str, arrived: Iterable[bytes]) -> list[tuple[int, bytes]]:
-        """Stamps and serialised messages of the ticks that are new on a topic."""
-        nanoseconds, newest, messages = self.ticks.nanoseconds, self.newest[topic], []
-        for data in arrived:
-            stamp = stamp_of(data)
-            tick = round(stamp / nanoseconds)
-            if tick > newest and self.owns(data):
-                newest = tick
-                messages.append((stamp, data))
-        self.newest[topic] = newest
-        return messages
-
-    def put(self, topic: str, messages: list[tuple[int, bytes]]) -> None:
-        """Hand messages to the bag, or keep them until the bag is open."""
+        come = {
+            topic: list(taken(subscription)) for topic, subscription in (*self.ticked.items(), *self.others.items())
+        }
+        if self.first_message is None and any(come[topic] for topic in SENDERS):
+            self.first_message = time.monotonic()
         if self.writer is None:
-            self.buffer.append((topic, messages))
-        else:
-            self.writer.write_many(topic, messages, TOPIC_TYPES[topic])
+            for topic, messages in come.items():
+                self.early[topic] += messages
+            return
+        for topic in self.ticked:
+            if messages := self.part.drain(topic, [*self.early.pop(topic, ()), *come[topic]]):
+                self.writer.write_many(topic, messages, TOPIC_TYPES[topic])
+        # After the ticks: what a node says before its last one is there when that one is.
+        now = max(0, self.part.newest("joint_states")) * self.ticks.nanoseconds
+        for topic in self.others:
+            if others := [(now, data) for data in (*self.early.pop(topic, ()), *come[topic])]:
+                self.writer.write_many(topic, others, TOPIC_TYPES[topic])
+        self.announce()
 
     def announce(self) -> None:
         """Publish the newest tick that is there on every topic."""
-        if self.writer is None or not self.identity:
+        part = self.part
+        if self.writer is None or not part.identity:
             return
-        complete = min(
-            self.newest[topic] + every - 1 if self.newest[topic] >= 0 else -1 for topic, every in self.expected.items()
-        )
-        self.finished = 0 <= self.last_tick <= complete
+        complete = part.complete
+        part.finished = 0 <= part.last_tick <= complete
         if complete > self.announced:
             self.announced = complete
-            tick = complete if self.counts["joint_states"] else -1
-            self.progress.publish(Header(frame_id=self.identity, stamp=self.ticks.stamp(tick)))
-
-    def missing(self) -> int:
-        """Ticks that are not in the bag on a topic that should have them."""
-        ticks = self.newest["joint_states"] + 1
-        return sum(max(0, -(-ticks // every) - self.counts[topic]) for topic, every in self.expected.items() if ticks)
+            tick = complete if part.counts["joint_states"] else -1
+            self.progress.publish(Header(frame_id=part.identity, stamp=stamp_at(tick, self.ticks)))
 
     def destroy_node(self) -> None:
         """Close the bag, so that it is readable however the run ended."""
         try:
             if not self.failure:
-                self.poll()
-                if self.writer is None and self.buffer:
+                if self.writer is None and any(self.early[topic] for topic in SENDERS):
                     self.open()
+                self.poll()
         finally:
             if self.writer is not None:
                 self.writer.close()
@@ -287,14 +242,6 @@ class Recorder(LimbNode):
 def refuse(message: bytes) -> None:
     """The callback of a topic that is polled."""
     raise AssertionError("an executor has taken a message of the recorder")
-
-
-def last_tick(data: bytes) -> int:
-    """The field `last_tick` of a serialised JointTorque: behind the header and the tick."""
-    (length,) = struct.unpack_from("<I", data, 12)
-    tick = -(-(12 + length) // 8) * 8
-    (last,) = struct.unpack_from("<q", data, 4 + tick + 8)
-    return int(last)
 
 
 main: Callable[..., None] = main_of(Recorder)

@@ -21,12 +21,13 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_namespace import validate_namespace
 
 from limb_nodes.errors import FieldError, UserError
+from limb_nodes.nodes.base import PARENT
 from limb_nodes.nodes.distribution import make_executor
 
 # The executor is asked for one event at a time with a time-out: without one it hangs when idle.
 SPIN_TIMEOUT = 0.05
-# The variable by which a run tells the nodes in processes of their own whose children they are: they end with it.
-PARENT = "LIMB_RUN_PARENT"
+# The signals by which a run is ended in order; the last comes when a terminal is closed.
+ENDING = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
 def spin(executor: Executor, done: Callable[[], bool]) -> None:
@@ -50,11 +51,11 @@ def check_namespace(namespace: str) -> None:
 
 
 class Interrupt:
-    """Turns SIGINT and SIGTERM into a wish to stop, so that no callback is cut in two."""
+    """Turns SIGINT, SIGTERM and SIGHUP into a wish to stop, so that no callback is cut in two."""
 
     def __init__(self) -> None:
         self.wanted = False
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in ENDING:
             signal.signal(number, self._want)
 
     def _want(self, *_: Any) -> None:
@@ -86,8 +87,7 @@ def run_node(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
         parent = os.environ.get(PARENT)
         orphaned = (lambda: str(os.getppid()) != parent) if parent else (lambda: False)
         spin(executor, lambda: interrupt.wanted or node.finished or bool(node.failure) or orphaned())
-        if node.failure:
-            raise UserError(node.failure)
+        node.raise_failure()
         if not interrupt.wanted:
             linger(executor, node, interrupt)
         return 0

@@ -17,17 +17,18 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
 from limb_nodes.errors import FieldError, UserError
+from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.foundation.topics import NODES
 from limb_nodes.nodes.activation_input import ActivationInput
-from limb_nodes.nodes.base import NODES
 from limb_nodes.nodes.children import Child, stop
 from limb_nodes.nodes.distribution import make_executor
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
+from limb_nodes.nodes.messages import tick_of
 from limb_nodes.nodes.muscle_stack import MuscleStack
 from limb_nodes.nodes.qos import STREAM
 from limb_nodes.nodes.recorder import Recorder
 from limb_nodes.nodes.running import Interrupt, close
 from limb_nodes.nodes.settings import Outcome, Progress, RunSettings, recorded_outcome
-from limb_nodes.nodes.ticks import Ticks
 
 CLASSES = {
     "activation_input": ActivationInput,
@@ -60,10 +61,12 @@ def run_in_one_process(settings: RunSettings, progress: Progress) -> Outcome:
         seconds = spin_to_the_end(executor, nodes, interrupt, progress)
         recorder, live = nodes["recorder"], nodes["activation_input"].live
         return Outcome(
-            ticks=recorder.counts["joint_states"],
-            missing=recorder.missing(),
-            missed=nodes["limb_dynamics"].missed,
-            bad_input=sum(node.bad_input for node in nodes.values()),
+            ticks=recorder.part.counts["joint_states"],
+            missing=recorder.part.missing(),
+            missed=nodes["limb_dynamics"].part.missed,
+            bad_input=sum(node.part.bad_input for node in nodes.values()),
+            foreign=sum(node.part.foreign for node in nodes.values()),
+            conflicts=sum(node.part.conflicts for node in nodes.values()),
             seconds=seconds,
             interrupted=interrupt.wanted,
             live=live.told() if live else "",
@@ -90,14 +93,13 @@ def spin_to_the_end(executor: Executor, nodes: Mapping[str, Any], interrupt: Int
     while not (recorder.finished or interrupt.wanted):
         turn = time.monotonic()
         executor.spin_once(timeout_sec=TURN)
-        if started is None and dynamics.tick > 0:
+        if started is None and dynamics.part.tick > 0:
             started = turn
         if recorder.announced != shown:
             shown = recorder.announced
             progress(shown)
         for node in nodes.values():
-            if node.failure:
-                raise UserError(node.failure)
+            node.raise_failure()
     ended = time.monotonic()
     return ended - (started or ended)
 
@@ -118,7 +120,7 @@ def run_in_processes(settings: RunSettings, progress: Progress) -> Outcome:
         seconds = await_the_end(executor, observer, children, interrupt, progress)
         stop(children)
         if interrupt.wanted and not Path(settings.out).exists():
-            return Outcome(0, 0, 0, 0, 0.0, True)
+            return Outcome(0, 0, 0, 0, 0, 0, 0.0, True)
         children["recorder"].raise_failure()
         return recorded_outcome(settings, seconds, interrupt.wanted)
     finally:
@@ -137,7 +139,7 @@ class Observer(Node):
 
     def _on_progress(self, message: Header) -> None:
         if message.frame_id == self._identity:
-            self.recorded = self._ticks.tick(message.stamp)
+            self.recorded = tick_of(message.stamp, self._ticks)
 
     def why_nothing_comes(self) -> str:
         """What to look at if a run does not begin."""

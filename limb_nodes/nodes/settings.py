@@ -10,13 +10,13 @@ from typing import Any
 from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.bags.read import BagReader
 from limb_nodes.errors import FieldError
+from limb_nodes.exchange.identity import new_identity
+from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.foundation.topics import NODES, STATES
 from limb_nodes.model import load_limb
-from limb_nodes.nodes.base import NODES, STATES
-from limb_nodes.nodes.identity import new_identity
 from limb_nodes.nodes.live_readers import reader
 from limb_nodes.nodes.live_settings import HEARD, LiveSettings
 from limb_nodes.nodes.running import check_namespace
-from limb_nodes.nodes.ticks import Ticks
 from limb_nodes.signals.activation import load_activation
 
 # Longest run (s).
@@ -65,14 +65,17 @@ class RunSettings:
 @dataclass(frozen=True)
 class Outcome:
     """How a run went. ticks: on the topic joint_states; missing: ticks not in the bag, over all topics;
-    missed: deadlines in real time; bad_input: messages that could not be used; seconds: wall time. live: how a live
-    source did, in words, empty without one; lost: whether it never came, or was silent at the end.
+    missed: deadlines in real time; bad_input: messages that could not be used; foreign: messages of others; conflicts:
+    ticks that came twice with different values; seconds: wall time. live: how a live source did, in words, empty
+    without one; lost: whether it never came, or was silent at the end.
     """
 
     ticks: int
     missing: int
     missed: int
     bad_input: int
+    foreign: int
+    conflicts: int
     seconds: float
     interrupted: bool
     live: str = ""
@@ -119,24 +122,21 @@ def recorded_outcome(settings: RunSettings, seconds: float, interrupted: bool) -
         for topic in ("activation", "joint_torque", "movement_pattern", *settings.states):
             every = settings.state_every if topic in settings.states else 1
             missing += max(0, -(-ticks // every) - bag.count(topic))
-        missed, bad_input, live, lost = reported(bag, settings)
-    return Outcome(ticks, missing, missed, bad_input, seconds, interrupted, live, lost)
+        return Outcome(ticks, missing, seconds=seconds, interrupted=interrupted, **reported(bag, settings))
 
 
-def reported(bag: BagReader, settings: RunSettings) -> tuple[int, int, str, bool]:
-    """What the nodes have told on `/diagnostics`.
-
-    Missed deadlines, messages that could not be used, how a live source did, and whether it was lost.
-    """
-    missed, bad_input = 0, dict.fromkeys(NODES, 0)
+def reported(bag: BagReader, settings: RunSettings) -> dict[str, Any]:
+    """What the nodes have told on `/diagnostics`, as fields of an `Outcome`."""
+    counts = {key: dict.fromkeys(NODES, 0) for key in ("missed_deadlines", "bad_input", "foreign", "conflicts")}
     live, lost = ("nothing is known of the live source", True) if not settings.source else ("", False)
     names = {f"/{settings.namespace.strip('/')}/{node}".replace("//", "/"): node for node in NODES}
     messages = bag.read_topic("/diagnostics") if bag.has("/diagnostics") else ()
     for status in (status for _, message in messages for status in message.status if status.name in names):
         values = {pair.key: pair.value for pair in status.values}
-        missed = max(missed, int(values.get("missed_deadlines", 0)))
         node = names[status.name]
-        bad_input[node] = max(bad_input[node], int(values.get("bad_input", 0)))
+        for key, of_node in counts.items():
+            of_node[node] = max(of_node[node], int(values.get(key, 0)))
         if "input" in values:
             live, lost = status.message, values["input"] != HEARD
-    return missed, sum(bad_input.values()), live, lost
+    told = {key: sum(of_node.values()) for key, of_node in counts.items()}
+    return {"missed": told.pop("missed_deadlines"), **told, "live": live, "lost": lost}

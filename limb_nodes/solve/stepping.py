@@ -170,6 +170,19 @@ class MuscleStepper:
         model.program.observe(self._state, excitation, *records, self._muscles, self._units)
         return self._muscles, self._units
 
+    def culprit(self, angle: FloatArray, velocity: FloatArray, excitation: FloatArray) -> str:
+        """In words, the first muscle or motor unit that shows a number that is not finite, and which."""
+        muscles, units = self.observe(angle, velocity, excitation)
+        limb = self.model.limb
+        of_unit = [f"{muscle.name}.{unit.name}" for muscle in limb.muscles for unit in muscle.units]
+        for names, outputs, shown in (
+            (of_unit, UNIT_OUTPUTS, units),
+            (limb.muscle_names, MUSCLE_OUTPUTS, muscles),
+        ):
+            for row, column in np.argwhere(~np.isfinite(shown)):
+                return f"muscles.{names[row]}: {outputs[column]} is {shown[row, column]:g}"
+        return "muscles: the torque or one of its slopes is not finite"
+
 
 class LimbStepper:
     """The chain of segments under torques with slopes.

@@ -13,7 +13,16 @@ from limb_nodes.foundation.text_table import aligned
 from tests import faults
 from tests.faults.trial import Trial
 
-HEAD = ("kind", "trials", "lost, most s", "changed values", "time until said, most s", "hangs", "tracebacks", "code run")
+HEAD = (
+    "kind",
+    "trials",
+    "lost, most s",
+    "changed values",
+    "time until said, most s",
+    "hangs",
+    "tracebacks",
+    "code run",
+)
 
 
 def kinds() -> dict[str, ModuleType]:

@@ -15,7 +15,8 @@ from limb_msgs.msg import JointTorque, MuscleActivation
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from limb_nodes.nodes.identity import comes_before, new_claim, new_identity
+from limb_nodes.exchange.identity import new_identity
+from limb_nodes.nodes.claims import comes_before, new_claim
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
 from limb_nodes.nodes.muscle_stack import MuscleStack
 from limb_nodes.nodes.qos import LATCHED, STREAM
@@ -55,18 +56,18 @@ def test_every_newcomer_is_refused_and_the_run_in_place_is_as_if_alone(
     graph = bench()
     ready, _ = checked(RunSettings(limb, waves, rate=1000.0, duration=0.5, out=str(tmp_path / "first")))
     first = {name: graph.add(kind, **ready.parameters(name)) for name, kind in CLASSES.items()}
-    graph.until(lambda: first["limb_dynamics"].tick > 100, "the first ticks")
+    graph.until(lambda: first["limb_dynamics"].part.tick > 100, "the first ticks")
     arguments = ["run", limb, "--activation", "flexor=0.9,extensor=0", "--duration", LONG]
     for number in range(0, NEWCOMERS, TOGETHER):
         options = ["--processes"] if number == 0 else []
         children = [processes.limb(*arguments, "--out", tmp_path / f"{number + k}", *options) for k in range(TOGETHER)]
         for child in children:
             refused(child)
-        tick = first["limb_dynamics"].tick
-        graph.until(lambda tick=tick: first["limb_dynamics"].tick > tick, "another tick")
+        tick = first["limb_dynamics"].part.tick
+        graph.until(lambda tick=tick: first["limb_dynamics"].part.tick > tick, "another tick")
     graph.until(lambda: first["recorder"].finished, "the end of the run in place")
-    assert {name: node.failure for name, node in first.items()} == dict.fromkeys(CLASSES, "")
-    assert {name: node.bad_input for name, node in first.items()} == dict.fromkeys(CLASSES, 0)
+    assert {name: node.failure for name, node in first.items()} == dict.fromkeys(CLASSES)
+    assert {name: node.part.bad_input for name, node in first.items()} == dict.fromkeys(CLASSES, 0)
     graph.finish(first["recorder"])
     assert bags.differences(reference, tmp_path / "first") == []
 
@@ -117,15 +118,15 @@ def test_limb_dynamics_gives_way_to_an_earlier_claim_and_answers_a_later_one(ben
     heard = graph.listen(Header, "run_identity", STREAM)
     node = graph.add(LimbDynamics, limb=limb)
     graph.until(lambda: heard, "its claim")
-    assert heard[0].frame_id == node.identity
+    assert heard[0].frame_id == node.part.identity
     claims = graph.publisher(Header, "run_identity", LATCHED, listeners=2)
     claims.publish(new_claim(new_identity()))
     graph.until(lambda: heard.count(heard[0]) == 2, "its claim, again")
-    assert node.failure == ""
+    assert node.failure is None
     claims.publish(earlier)
     graph.until(lambda: node.failure, "it to give way")
-    assert earlier.frame_id in node.failure
-    assert "namespace is /, in which" in node.failure
+    assert earlier.frame_id in node.failure[0]
+    assert "namespace is /, in which" in node.failure[0]
 
 
 def activation(identity: str, tick: int, value: float) -> MuscleActivation:
@@ -151,16 +152,16 @@ def test_a_node_takes_its_run_s_messages_alone(given, bench, limb, capfd):
     activations = graph.publisher(MuscleActivation, "activation", STREAM)
     joints = graph.publisher(JointState, "joint_states", STREAM)
     activations.publish(activation(own, 0, 0.5))
-    graph.until(lambda: 0 in node.inputs, "the first activation")
+    graph.until(lambda: 0 in node.part.inputs, "the first activation")
     for identity, value in (other, 0.9), (own, 0.25):
         activations.publish(activation(identity, 1, value))
         joints.publish(states(identity, 0))
     graph.until(lambda: heard, "a torque")
-    assert (node.identity, heard[0].header.frame_id, len(heard)) == (own, own, 1)
-    assert node.excitation.tolist() == [0.25, 0.25]
-    assert node.bad_input == 0
+    assert (node.part.identity, heard[0].header.frame_id, len(heard)) == (own, own, 1)
+    assert node.part.excitation.tolist() == [0.25, 0.25]
+    assert (node.part.bad_input, node.part.foreign) == (0, 2)
     joints.publish(states("", 1))
-    graph.until(lambda: node.bad_input == 1, "the message without an identity to be counted")
+    graph.until(lambda: node.part.foreign == 3, "the message without an identity to be counted")
     assert "header.frame_id" in capfd.readouterr().err
 
 
@@ -169,13 +170,13 @@ def test_a_recorder_without_an_identity_records_the_run_that_it_hears_of(bench, 
     ready = graph.listen(Header, "recorder_progress", STREAM)
     recorder = graph.add(Recorder, limb=limb, rate=1000.0, out=str(tmp_path / "run"))
     gone = graph.add(LimbDynamics, limb=limb, rate=1000.0, await_recorder=True)
-    graph.until(lambda: recorder.identity == gone.identity, "the first run")
+    graph.until(lambda: recorder.part.identity == gone.part.identity, "the first run")
     graph.finish(gone)
     dynamics = graph.add(LimbDynamics, limb=limb, rate=1000.0, await_recorder=True)
     for name in "activation_input", "muscle_stack":
         own = {"source": "flexor=0.9,extensor=0", "duration": 0.01} if name == "activation_input" else {}
         graph.add(CLASSES[name], limb=limb, rate=1000.0, **own)
     graph.until(lambda: recorder.finished, "the end of the second run")
-    assert {message.frame_id for message in ready} <= {gone.identity, dynamics.identity}
-    assert recorder.identity == dynamics.identity
-    assert recorder.missing() == 0
+    assert {message.frame_id for message in ready} <= {gone.part.identity, dynamics.part.identity}
+    assert recorder.part.identity == dynamics.part.identity
+    assert recorder.part.missing() == 0

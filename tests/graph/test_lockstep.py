@@ -115,10 +115,10 @@ def test_a_node_that_is_started_anew_before_the_run(reference, limb, waves, bags
 
 
 def test_a_late_recorder_gets_every_tick_within_the_history(limb, waves, bags, bench, tmp_path):
+    from limb_nodes.exchange.stream import HISTORY
     from limb_nodes.nodes.activation_input import ActivationInput
     from limb_nodes.nodes.limb_dynamics import LimbDynamics
     from limb_nodes.nodes.muscle_stack import MuscleStack
-    from limb_nodes.nodes.qos import HISTORY
     from limb_nodes.nodes.recorder import Recorder
 
     graph = bench()
@@ -127,10 +127,10 @@ def test_a_late_recorder_gets_every_tick_within_the_history(limb, waves, bags, b
     graph.add(MuscleStack, **common)
     dynamics = graph.add(LimbDynamics, **common)
     graph.until(lambda: dynamics.finished, "the run to end without a recorder")
-    assert dynamics.tick == 400 < HISTORY
+    assert dynamics.part.tick == 400 < HISTORY
     recorder = graph.add(Recorder, out=str(tmp_path / "run"), **common)
     graph.until(lambda: recorder.finished, "the recorder to have every tick")
-    assert recorder.missing() == 0
+    assert recorder.part.missing() == 0
     graph.finish(recorder)
     bags.complete(tmp_path / "run", 401, PERIOD_NS)
 

@@ -17,16 +17,17 @@ from rclpy.duration import Duration
 from rclpy.signals import SignalHandlerOptions
 
 from limb_nodes.bags.read import BagReader
+from limb_nodes.exchange.movement import MOST_AHEAD, TORQUE_FIELDS
+from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.model import load_limb
 from limb_nodes.nodes.activation_input import ActivationInput
-from limb_nodes.nodes.limb_dynamics import MOST_AHEAD, TORQUE_FIELDS, LimbDynamics
+from limb_nodes.nodes.limb_dynamics import LimbDynamics
 from limb_nodes.nodes.muscle_stack import MuscleStack
 from limb_nodes.nodes.qos import EVERY, LIVE, STREAM
 from limb_nodes.nodes.recorder import Recorder
 from limb_nodes.nodes.running import close
 from limb_nodes.nodes.session import run_in_one_process
 from limb_nodes.nodes.settings import RunSettings, checked
-from limb_nodes.nodes.ticks import Ticks
 from limb_nodes.solve.stepping import LimbStepper
 
 RATE, PERIOD_NS = 200.0, 5_000_000
@@ -97,24 +98,24 @@ def test_a_muscle_stack_that_stands_still(rate, limb, waves, lockstep, processes
     graph.add(ActivationInput, source=waves, duration=seconds, **common)
     dynamics = graph.add(LimbDynamics, await_recorder=True, **common)
     recorder = graph.add(Recorder, out=str(tmp_path / "run"), **common)
-    graph.until(lambda: dynamics.tick > 0.5 * rate, "half a second of movement")
+    graph.until(lambda: dynamics.part.tick > 0.5 * rate, "half a second of movement")
     muscle_stack.signal(signal.SIGSTOP)
-    resume = dynamics.elapsed() + STILL * rate
-    graph.until(lambda: dynamics.elapsed() > resume, "the stand-still to end")
+    resume = dynamics.part.elapsed() + STILL * rate
+    graph.until(lambda: dynamics.part.elapsed() > resume, "the stand-still to end")
     muscle_stack.signal(signal.SIGCONT)
     graph.until(lambda: recorder.finished and dynamics.finished, "the end")
-    graph.until(lambda: missed_deadlines(told)[-1:] == [dynamics.missed], "the last report")
+    graph.until(lambda: missed_deadlines(told)[-1:] == [dynamics.part.missed], "the last report")
     assert muscle_stack.wait() == 0
     reported = missed_deadlines(told)
     assert reported == sorted(reported)
     # What became due meanwhile, but for the tick that was on its way, the one whose torque was, and rounding.
-    assert STILL * rate - 4 <= dynamics.missed <= dynamics.tick
+    assert STILL * rate - 4 <= dynamics.part.missed <= dynamics.part.tick
     graph.finish(recorder)
     found = bags.decoded(tmp_path / "run", (*TOPICS, "joint_torque"))
     ticks = found["joint_torque"]["tick"].tolist()
     assert ticks == list(range(round(seconds * rate) + 1)), "muscle_stack answers every tick, late ones too"
-    assert torques_carried(tmp_path / "run", limb, rate, bags) <= dynamics.missed
-    differ_little(found, still, dynamics.missed)
+    assert torques_carried(tmp_path / "run", limb, rate, bags) <= dynamics.part.missed
+    differ_little(found, still, dynamics.part.missed)
     with BagReader(tmp_path / "run") as bag:
         assert bag.has("/diagnostics")
 
@@ -175,9 +176,8 @@ def missed(path: Path) -> int:
 
 def missed_deadlines(told: list[DiagnosticArray]) -> list[int]:
     """What the limb has reported, the only node that has something to say."""
-    reports = [status for message in told for status in message.status]
-    assert {status.name for status in reports} <= {"/limb_dynamics"}
-    return [int(pair.value) for status in reports for pair in status.values if pair.key == "missed_deadlines"]
+    pairs = [pair for message in told for status in message.status for pair in status.values]
+    return [int(pair.value) for pair in pairs if pair.key == "missed_deadlines"]
 
 
 def torques_carried(path: Path, limb: str, rate: float, bags: Any) -> int:

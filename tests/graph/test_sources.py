@@ -22,20 +22,21 @@ from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiAr
 
 from limb_nodes import cli
 from limb_nodes.bags.read import BagReader
+from limb_nodes.exchange.identity import new_identity
+from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.nodes import live_source
 from limb_nodes.nodes.activation_input import ActivationInput
 from limb_nodes.nodes.distribution import make_executor
-from limb_nodes.nodes.identity import new_identity
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
 from limb_nodes.nodes.live_readers import EnvelopeReader, RawReader
 from limb_nodes.nodes.live_settings import LiveSettings
+from limb_nodes.nodes.messages import stamp_at, tick_of
 from limb_nodes.nodes.muscle_stack import MuscleStack
 from limb_nodes.nodes.qos import LIVE, STREAM
 from limb_nodes.nodes.recorder import Recorder
 from limb_nodes.nodes.running import close
 from limb_nodes.nodes.session import run_in_one_process
 from limb_nodes.nodes.settings import RunSettings, checked
-from limb_nodes.nodes.ticks import Ticks
 from limb_nodes.signals.activation import load_activation
 from limb_nodes.signals.emg import envelopes
 from limb_nodes.signals.options import EnvelopeOptions
@@ -79,7 +80,7 @@ def foreign() -> Iterator[Callable[..., Any]]:
 
 
 def envelope(values: Any, names: list[str] = MUSCLES, seconds: float = 1.0) -> MuscleActivation:
-    stamp = Ticks(1e3).stamp(round(seconds * 1e3))
+    stamp = stamp_at(round(seconds * 1e3), Ticks(1e3))
     return MuscleActivation(header=Header(stamp=stamp), name=names, activation=[float(value) for value in values])
 
 
@@ -101,7 +102,7 @@ class Live:
     def step(self) -> list[float]:
         """Let the limb move by a tick; the activations that are sent for the next."""
         self.tick += 1
-        header = Header(stamp=TICKS.stamp(self.tick), frame_id=RUN)
+        header = Header(stamp=stamp_at(self.tick, TICKS), frame_id=RUN)
         self.joints.publish(JointState(header=header, name=["joint"], position=[0.0], velocity=[0.0]))
         self.graph.until(
             lambda: self.heard and self.heard[-1].tick == self.tick + 1 and self.heard[-1],
@@ -237,13 +238,13 @@ def test_a_foreign_player_moves_the_limb_as_the_bag_does(bench, limb, bags, tmp_
         recorder = graph.add(Recorder, out=str(tmp_path / "run"), **common)
 
         def on_states(message: JointState) -> None:
-            k = min(TICKS.tick(message.header.stamp) - start, count)
+            k = min(tick_of(message.header.stamp, TICKS) - start, count)
             if k >= 0:
                 publisher.publish(envelope([values["extensor"][k], values["flexor"][k]], ["EMG 2", "EMG 1"]))
 
         graph.probe.create_subscription(JointState, "joint_states", on_states, STREAM)
         graph.until(lambda: recorder.finished, "the end")
-        missed = dynamics.missed
+        missed = dynamics.part.missed
         graph.finish(recorder)
     found = bags.decoded(tmp_path / "run", ("activation", "joint_states"))
     played = found["activation"]["activation"]
@@ -310,11 +311,11 @@ def test_raw_emg_is_filtered_as_limb_emg_does(quality, bench, limb, foreign, tmp
     assert row == samples
     assert wanted[-1].min() > 0.1
     assert live.step() == live.node.newest.tolist()
-    bad = live.node.bad_input
+    bad = live.node.part.bad_input
     for data in ([1.0, 2.0], [], [float("nan")] * 3, [1e300] * 3):
         live.send(publisher, Float64MultiArray(data=data))
         bad += 1
-        assert live.node.bad_input == bad
+        assert live.node.part.bad_input == bad
     live.send(publisher, Float64MultiArray(data=[float("inf"), 0.0, 1.0]))
     assert np.isfinite(live.node.newest).all()
 
@@ -565,7 +566,7 @@ def play_beside(node: Any, case: Case) -> None:
     begun: list[float] = []
 
     def on_states(message: JointState) -> None:
-        seconds = TICKS.tick(message.header.stamp) / RATE
+        seconds = tick_of(message.header.stamp, TICKS) / RATE
         # activation_input and recorder.
         if not begun and publisher.get_subscription_count() < 2:
             return

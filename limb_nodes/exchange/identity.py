@@ -1,21 +1,14 @@
 """The identity of a run: its nodes agree on it before tick 0, and every message of the run carries it.
 
 It stands in `header.frame_id`, the one field that all these messages share; joint angles and torques have no frame.
-What carries another identity belongs to another run. On the topic `run_identity` limb_dynamics claims the namespace for
-its run, with the time of the claim; of two runs that claim the same namespace the later one gives way.
+What carries another identity belongs to another run.
 """
 
 from __future__ import annotations
 
 import re
 import struct
-import time
 import uuid
-
-from builtin_interfaces.msg import Time
-from std_msgs.msg import Header
-
-from limb_nodes.nodes.ticks import SECOND
 
 LENGTH = 32
 FORM = f"{LENGTH} hexadecimal digits"
@@ -43,15 +36,3 @@ def identity_of(frame: bytes) -> str:
     """The identity in such bytes; empty if they hold none."""
     text = frame[4:-1].decode("ascii", "replace")
     return text if is_identity(text) and frame == frame_of(text) else ""
-
-
-def new_claim(identity: str) -> Header:
-    """A claim of the namespace, made now."""
-    sec, nanosec = divmod(time.time_ns(), SECOND)
-    return Header(frame_id=identity, stamp=Time(sec=sec, nanosec=nanosec))
-
-
-def comes_before(one: Header, other: Header) -> bool:
-    """Whether the first of two claims was made before the second; both runs come to the same answer."""
-    first, second = ((claim.stamp.sec, claim.stamp.nanosec, claim.frame_id) for claim in (one, other))
-    return first < second

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from builtin_interfaces.msg import Time
-
 from limb_nodes.errors import UserError
 
 SECOND = 1_000_000_000
@@ -21,12 +19,3 @@ class Ticks:
         self.rate = rate
         self.nanoseconds = round(SECOND / rate)
         self.period = self.nanoseconds / SECOND
-
-    def stamp(self, tick: int) -> Time:
-        """The time of a tick."""
-        sec, nanosec = divmod(tick * self.nanoseconds, SECOND)
-        return Time(sec=sec, nanosec=nanosec)
-
-    def tick(self, stamp: Time) -> int:
-        """The tick of a time."""
-        return round((stamp.sec * SECOND + stamp.nanosec) / self.nanoseconds)

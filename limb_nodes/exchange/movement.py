@@ -1,0 +1,188 @@
+"""The part of limb_dynamics: it offers joint_states 0, then steps from tick to tick under the joint torques."""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from typing import Any
+
+import numpy as np
+
+from limb_nodes.exchange.part import Part
+from limb_nodes.exchange.stream import RECORDER_LAG
+from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.model.points import points
+from limb_nodes.solve.stepping import LimbStepper
+
+TORQUE_FIELDS = ("torque", "slope_angle", "slope_velocity", "slope_time")
+REMEMBERED = 1000
+# How long the limb goes on with a torque in real time (s). Farther its slopes say nothing.
+MOST_AHEAD = 0.05
+
+
+class LimbPart(Part):
+    """From joint torques to joint states and the movement pattern.
+
+    In lockstep joint_torque k leads to joint_states k + 1. In real time `step_to_now` does, at the pace of the wall
+    clock, with the newest torque; ticks whose torque is not there in time are counted.
+
+    tick: that the limb is at. last_tick: of the run, -1 while it is not known. missed: deadlines. started_at: when real
+    time began (s of the monotonic clock). recorded: the newest tick that the recorder has, -1 before.
+    """
+
+    def __init__(self, *given: Any, awaits_recorder: bool = False, **options: Any) -> None:
+        super().__init__(*given, **options)
+        self.awaits_recorder = awaits_recorder
+        self.stepper = LimbStepper(self.limb)
+        self.tick = 0
+        self.begun = False
+        self.most_ahead = max(1, round(MOST_AHEAD / self.ticks.period))
+        self.behind = False
+        self.missed = 0
+        self.recorded = -1
+        self.pending: FloatArray | None = None
+        self.newest: tuple[int, FloatArray] | None = None
+        self.history: OrderedDict[int, tuple[FloatArray, FloatArray]] = OrderedDict()
+        self.started_at: float | None = None
+        self.last_tick = -1
+        self.joint_states, self.pattern = self.sends("joint_states"), self.sends("movement_pattern")
+        self.takes("joint_torque", self.on_torque, gaps=self.realtime)
+
+    def begin(self) -> None:
+        """Offer the first joint states, unless the recorder is to be there first."""
+        if not self.awaits_recorder:
+            self.offer()
+
+    def offer(self) -> None:
+        """Send the joint states of the current tick."""
+        self.begun = True
+        values = self.joint_states.values
+        values["position"][:], values["velocity"][:] = self.stepper.angle, self.stepper.velocity
+        self.joint_states.publish(self.tick)
+
+    def on_recorded(self, tick: int) -> None:
+        """The recorder has every tick up to this one; -1 when it is ready."""
+        if not self.recorded <= tick <= self.tick:
+            self.refuse(f"recorder_progress: tick {tick} is not from {self.recorded} to {self.tick}")
+            return
+        self.recorded = tick
+        if not self.begun:
+            self.offer()
+        elif self.pending is not None and self.tick - self.recorded <= RECORDER_LAG:
+            held, self.pending = self.pending, None
+            self.step(held)
+
+    def on_torque(self, tick: int, data: bytes) -> None:
+        """Take over a torque; in lockstep also step."""
+        if tick > self.tick:
+            self.refuse(f"joint_torque: a message is of tick {tick}, which has not been; the limb is at {self.tick}")
+            return
+        rows = np.array([self.values("joint_torque", data, name) for name in TORQUE_FIELDS])
+        self.last_tick = self.forms["joint_torque"].number(data, "last_tick")
+        if self.realtime:
+            self.newest = tick, rows
+            if self.behind:
+                self.catch_up(int(self.elapsed()))
+        elif self.awaits_recorder and self.tick - self.recorded > RECORDER_LAG:
+            self.pending = rows
+        elif not self.finished:
+            self.step(rows)
+
+    def step_to_now(self) -> None:
+        """In real time, step as far as the wall clock has gone."""
+        if self.newest is None or self.finished:
+            return
+        if self.started_at is None:
+            self.started_at = time.monotonic() - self.ticks.period
+        self.catch_up(self.due())
+
+    def catch_up(self, due: int) -> None:
+        """Step to the tick that is due, with the newest torque.
+
+        A tick on time makes do with the torque of one before. A late one waits for its own: muscles that are behind
+        would answer a movement that went on without them, and throw the limb about.
+        """
+        self.behind = False
+        while self.tick < due and not self.finished:
+            assert self.newest is not None
+            tick, rows = self.newest
+            late = self.tick + 1 < due
+            if tick != self.tick and (late or self.tick - tick >= self.most_ahead):
+                self.behind = True
+                break
+            # Each tick that came a whole period late, or without its own torque, is one missed deadline.
+            self.missed += late or tick != self.tick
+            if tick != self.tick:
+                rows = self.carried(tick, rows)
+            self.step(rows)
+
+    def elapsed(self) -> float:
+        """How many ticks the wall clock has gone."""
+        assert self.started_at is not None
+        return (time.monotonic() - self.started_at) / self.ticks.period
+
+    def due(self) -> int:
+        """How many ticks are due when the timer fires."""
+        assert self.started_at is not None
+        elapsed = self.elapsed()
+        early = self.tick + 1 - elapsed
+        if 0.0 < early < 0.5:
+            # The timer keeps its phase; when it was taken, the call was late.
+            self.started_at -= early * self.ticks.period
+            return self.tick + 1
+        return int(elapsed)
+
+    def carried(self, tick: int, rows: FloatArray) -> FloatArray:
+        """The torque of an older tick, carried to the current state along its slopes."""
+        if tick not in self.history:
+            return rows
+        angle, velocity = self.history[tick]
+        carried = rows.copy()
+        carried[0] += (
+            rows[1] * (self.stepper.angle - angle)
+            + rows[2] * (self.stepper.velocity - velocity)
+            + rows[3] * (self.tick - tick) * self.ticks.period
+        )
+        return carried
+
+    def step(self, rows: FloatArray) -> None:
+        """Send the movement pattern of this tick and go on to the next. Raises RunError."""
+        self.finished = 0 <= self.last_tick <= self.tick
+        if self.finished:
+            self.before_the_end()
+        self.send_pattern(self.stepper.acceleration(rows))
+        if self.finished:
+            return
+        if self.realtime:
+            self.history[self.tick] = self.stepper.angle.copy(), self.stepper.velocity.copy()
+            if len(self.history) > REMEMBERED:
+                self.history.popitem(last=False)
+        self.stepper.step(rows, self.ticks.period)
+        self.tick += 1
+        self.offer()
+
+    def before_the_end(self) -> None:
+        """What is to be said before the message with which the recording ends."""
+
+    def send_pattern(self, acceleration: FloatArray) -> None:
+        """Send angles, velocities, accelerations and points of this tick."""
+        values = self.pattern.values
+        values["angle"][:], values["velocity"][:] = self.stepper.angle, self.stepper.velocity
+        values["acceleration"][:] = acceleration
+        values["position"][:, :2] = points(self.limb, list(self.stepper.angle))
+        self.pattern.publish(self.tick)
+
+    @property
+    def done(self) -> int:
+        """The tick that the limb is at."""
+        return self.tick
+
+    def awaited(self) -> str:
+        """The torque of this tick, or the recorder."""
+        if self.finished:
+            return ""
+        if self.pending is not None:
+            return f"the recording of tick {self.recorded + 1} from recorder"
+        if not self.begun:
+            return "the start of the recording from recorder"
+        return f"joint_torque of tick {self.tick} from muscle_stack"

@@ -1,0 +1,132 @@
+"""The part of muscle_stack: it answers joint_states k with joint_torque k once it holds the activations k and k + 1."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from limb_nodes.errors import RunError
+from limb_nodes.exchange.outgoing import Outgoing
+from limb_nodes.exchange.part import Part
+from limb_nodes.foundation.arrays import FloatArray
+from limb_nodes.foundation.topics import STATES
+from limb_nodes.solve.outputs import MUSCLE_FIELDS, MUSCLE_OUTPUTS, SARCOMERE_FIELDS, UNIT_FIELDS, UNIT_OUTPUTS
+from limb_nodes.solve.small import finite
+from limb_nodes.solve.stepping import MuscleStepper
+
+Input = tuple[FloatArray, FloatArray]
+
+
+class MusclePart(Part):
+    """From activations and joint states to joint torques and the states of muscles.
+
+    tick: the newest that is answered. states: topics of states that are sent, every `state_every` ticks.
+    """
+
+    def __init__(self, *given: Any, states: tuple[str, ...] = STATES, state_every: int = 1, **options: Any) -> None:
+        super().__init__(*given, **options)
+        self.state_every = state_every
+        self.stepper = MuscleStepper(self.limb)
+        n, muscles = len(self.limb.segments), len(self.limb.muscles)
+        self.tick = self.last_tick = -1
+        self.angle, self.velocity = np.zeros(n), np.zeros(n)
+        self.drive = self.stepper.drive(np.zeros(muscles))
+        self.last_drive: FloatArray | None = None
+        self.excitation: FloatArray = np.zeros(muscles)
+        self.inputs: dict[int, Input] = {}
+        self.waiting: tuple[int, FloatArray, FloatArray] | None = None
+        self.torque = self.sends("joint_torque")
+        self.states = [self.copied(topic) for topic in states]
+        self.takes("activation", self.on_activation, gaps=self.realtime)
+        self.takes("joint_states", self.on_joint_states, gaps=self.realtime)
+
+    def copied(self, topic: str) -> tuple[Outgoing, list[tuple[FloatArray, FloatArray]]]:
+        """The messages of a topic of states, and pairs of target and source to copy into them."""
+        muscles, units = self.stepper.shown
+        fields, outputs, shown = {
+            "muscle_state": (MUSCLE_FIELDS, MUSCLE_OUTPUTS, muscles),
+            "motor_unit_state": (UNIT_FIELDS, UNIT_OUTPUTS, units),
+            "sarcomere_state": (SARCOMERE_FIELDS, UNIT_OUTPUTS, units),
+        }[topic]
+        messages = self.sends(topic)
+        return messages, [(messages.values[field], shown[:, outputs.index(name)]) for field, name in fields.items()]
+
+    def on_activation(self, tick: int, data: bytes) -> None:
+        """Keep the activation of a tick."""
+        self.last_tick = self.forms["activation"].number(data, "last_tick")
+        values = self.values("activation", data, "activation").astype(np.float64)
+        self.excitation = values
+        self.inputs[tick] = values, self.stepper.drive(values)
+        self.answer()
+
+    def on_joint_states(self, tick: int, data: bytes) -> None:
+        """Keep the joint states; in real time the ones before are answered first, with what is there."""
+        angle, velocity = (
+            self.values("joint_states", data, name).astype(np.float64) for name in ("position", "velocity")
+        )
+        if self.waiting is not None and self.realtime:
+            self.send(None)
+        self.waiting = tick, angle, velocity
+        self.answer()
+
+    def answer(self) -> None:
+        """Send the torque that is waited for, if its activations are there."""
+        if self.waiting is None:
+            return
+        tick = self.waiting[0]
+        if tick in self.inputs and (tick == self.last_tick or tick + 1 in self.inputs):
+            self.send(self.inputs.get(tick + 1))
+
+    def send(self, following: Input | None) -> None:
+        """Advance to the tick that waits and send its torque and states. Raises RunError."""
+        assert self.waiting is not None
+        tick, angle, velocity = self.waiting
+        self.waiting = None
+        excitation, drive = self.advance(tick, angle, velocity)
+        next_drive = drive if following is None else following[1]
+        rows = self.stepper.torque(angle, velocity, drive, next_drive, self.ticks.period, self.last_drive)
+        if not finite(rows.reshape(-1)):
+            raise RunError(
+                f"{self.limb.file}: {self.stepper.culprit(angle, velocity, excitation)} at {tick * self.ticks.period:g}"
+                f" s (tick {tick}), which is no number; a law that gives finite values there is needed"
+            )
+        if self.states and tick % self.state_every == 0:
+            self.stepper.observe(angle, velocity, excitation)
+            for states, copies in self.states:
+                for target, source in copies:
+                    target[:] = source
+                states.publish(tick)
+        values = self.torque.values
+        values["torque"][:], values["slope_angle"][:] = rows[0], rows[1]
+        values["slope_velocity"][:], values["slope_time"][:] = rows[2], rows[3]
+        values["last_tick"][...] = self.last_tick
+        self.torque.publish(tick)
+        self.finished = 0 <= self.last_tick <= tick
+        for old in [key for key in self.inputs if key < tick]:
+            del self.inputs[old]
+
+    def advance(self, tick: int, angle: FloatArray, velocity: FloatArray) -> Input:
+        """Advance the internal states to joint states of a tick; its excitation and drive."""
+        excitation, drive = self.inputs.get(tick, (self.excitation, self.drive))
+        if self.tick >= 0:
+            period = (tick - self.tick) * self.ticks.period
+            before, after = (self.angle, self.velocity), (angle, velocity)
+            self.stepper.advance(before, after, self.drive, drive, period, self.last_drive)
+        self.last_drive = self.drive if tick == self.tick + 1 and self.tick >= 0 else None
+        self.tick, self.angle, self.velocity, self.drive = tick, angle, velocity, drive
+        return excitation, drive
+
+    @property
+    def done(self) -> int:
+        """The newest tick that is answered."""
+        return self.tick
+
+    def awaited(self) -> str:
+        """What the next answer needs."""
+        if self.finished:
+            return ""
+        if self.waiting is None:
+            return f"joint_states of tick {self.tick + 1} from limb_dynamics"
+        tick = self.waiting[0]
+        return f"activation of tick {tick + (tick in self.inputs)} from activation_input"

@@ -1,0 +1,77 @@
+"""The part of recorder: it takes every topic of a run, and knows which ticks are there on all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import Any
+
+from limb_nodes.exchange.outgoing import stamp_of
+from limb_nodes.exchange.part import Part
+from limb_nodes.foundation.topics import SENDERS, STATES
+
+
+class RecordingPart(Part):
+    """Takes each tick of each topic once.
+
+    expected: topic -> every how many ticks it should have a message. counts: topic -> messages taken. last_tick: of the
+    run, -1 while it is not known.
+    """
+
+    def __init__(self, *given: Any, **options: Any) -> None:
+        super().__init__(*given, **options)
+        self.expected = {topic: 1 for topic in SENDERS if topic not in STATES}
+        self.counts = dict.fromkeys(SENDERS, 0)
+        self.last_tick = -1
+        self._new: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in SENDERS}
+        for topic in SENDERS:
+            self.takes(topic, partial(self.on_message, topic), gaps=True)
+
+    def expect_states(self, parameters: Mapping[str, Any]) -> None:
+        """Expect the states that muscle_stack sends with these parameters."""
+        for topic in STATES:
+            if parameters.get(f"publish_{topic}", True):
+                self.streams[topic].every = self.expected[topic] = int(parameters.get("state_every", 1))
+
+    def on_message(self, topic: str, _: int, data: bytes) -> None:
+        """Keep a message until it is drained."""
+        self._new[topic].append((stamp_of(data), data))
+
+    def drain(self, topic: str, arrived: Iterable[bytes]) -> list[tuple[int, bytes]]:
+        """Take what has arrived on a topic; stamps (ns) and messages of the ticks that are new."""
+        for data in arrived:
+            self.receive(topic, data)
+        new, self._new[topic] = self._new[topic], []
+        if new and topic == "joint_torque":
+            self.last_tick = self.forms[topic].number(new[-1][1], "last_tick")
+        self.counts[topic] += len(new)
+        return new
+
+    def newest(self, topic: str) -> int:
+        """The newest tick that is taken of a topic, -1 before the first."""
+        stream = self.streams[topic]
+        return stream.next - stream.every if self.counts[topic] else -1
+
+    @property
+    def complete(self) -> int:
+        """The newest tick that is there on every topic, -1 before the first."""
+        newest = {topic: self.newest(topic) for topic in self.expected}
+        return min(tick + self.expected[topic] - 1 if tick >= 0 else -1 for topic, tick in newest.items())
+
+    def missing(self) -> int:
+        """Ticks that are not there on a topic that should have them."""
+        ticks = self.newest("joint_states") + 1
+        return sum(max(0, -(-ticks // every) - self.counts[topic]) for topic, every in self.expected.items() if ticks)
+
+    @property
+    def done(self) -> int:
+        """The newest tick that is there on every topic."""
+        return self.complete
+
+    def awaited(self) -> str:
+        """What is missing of the next tick."""
+        if self.finished:
+            return ""
+        tick = self.complete + 1
+        topic = next(topic for topic, every in self.expected.items() if self.newest(topic) + every - 1 < tick)
+        return f"{topic} of tick {tick} from {SENDERS[topic]}"
