@@ -57,7 +57,7 @@ def test_parameters_can_be_changed_before_and_read_after_they_are_declared(bench
 
 def test_an_executor_leaves_alone_what_is_no_subscription_of_its_node(bench):
     """The recorder hides those that it polls."""
-    from limb_nodes.nodes.recorder import TICKED
+    from limb_msgs.msg import MuscleActivation
 
     class Hiding(rclpy.node.Node):
         @property
@@ -67,10 +67,10 @@ def test_an_executor_leaves_alone_what_is_no_subscription_of_its_node(bench):
     graph = bench()
     node = Hiding("hiding", context=graph.context)
     taken: list[bytes] = []
-    subscription = node.create_subscription(TICKED["activation"], "topic", taken.append, 10, raw=True)
+    subscription = node.create_subscription(MuscleActivation, "topic", taken.append, 10, raw=True)
     graph.nodes.append(node)
     graph.executor.add_node(node)
-    graph.publisher(TICKED["activation"], "topic", 10).publish(TICKED["activation"](tick=3))
+    graph.publisher(MuscleActivation, "topic", 10).publish(MuscleActivation(tick=3))
     left: list[bytes] = []
     graph.until(lambda: left.extend(distribution.taken(subscription)) or left, "the message")
     assert taken == []

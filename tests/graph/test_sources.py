@@ -136,7 +136,7 @@ class Live:
 
     def reports(self) -> list[dict[str, str]]:
         """What the node has told of its source so far."""
-        return list(reports(self.told, "/activation_input"))
+        return [report for report in reports(self.told, "/activation_input") if "input" in report]
 
 
 def reports(messages: list[Any], node: str) -> Iterator[dict[str, str]]:
@@ -413,7 +413,7 @@ def test_a_silent_source_stops_the_run_if_asked(bench, limb, foreign):
     assert not live.node.finished
     # Too late: the nodes know of the end.
     publisher.publish(envelope([0.5, 0.5]))
-    header = Header(stamp=TICKS.stamp(last), frame_id=RUN)
+    header = Header(stamp=stamp_at(last, TICKS), frame_id=RUN)
     live.joints.publish(JointState(header=header, name=["joint"], position=[0.0], velocity=[0.0]))
     live.graph.until(lambda: live.node.finished, "the end")
     assert list(live.heard[-1].activation) == [0.25, 0.75]
