@@ -1,6 +1,43 @@
-"""Errors that a person can act on."""
+"""Errors that a person can act on, and how they show what the user gave."""
 
 from __future__ import annotations
+
+import re
+
+# Of a text of the user, an error shows so many characters at most; of a path, so many of each name and of all.
+MOST = 80
+MOST_PATH = 240
+MOST_LINE = 1200
+_PLAIN = re.compile(r"[ -~]*")
+_BREAK = re.compile(r"\s*[\t\n\v\f\r\x1c-\x1f\x85\u2028\u2029]\s*")
+_LONG_WORD = re.compile(rf"\S{{{MOST + 1},}}")
+_LONG_QUOTE = re.compile(rf"(?<!\w)(['\"])(?:(?!\1).){{{MOST - 1},}}\1(?!\w)")
+
+
+def shown(text: object, most: int = MOST) -> str:
+    """A text of the user as a message shows it: in one line, without control characters, its middle left out."""
+    return _shortened(escaped(_BREAK.sub(" ", str(text))), most)
+
+
+def escaped(text: str, kept: str = "") -> str:
+    """A text with what a terminal does not show, or obeys, as escapes such as `\\x1b`. kept: as they are."""
+    if _PLAIN.fullmatch(text):
+        return text
+    return "".join(sign if sign.isprintable() or sign in kept else ascii(sign)[1:-1] for sign in text)
+
+
+def _shortened(text: str, most: int) -> str:
+    if len(text) <= most:
+        return text
+    head = (most - 3) * 3 // 5
+    return f"{text[:head]}...{text[head + 3 - most :]}"
+
+
+def _short_path(word: str) -> str:
+    """A long word; if it is a path, its names are shortened one by one."""
+    if "/" not in word:
+        return _shortened(word, MOST)
+    return _shortened("/".join(_shortened(name, MOST) for name in word.split("/")), MOST_PATH)
 
 
 class UserError(Exception):
@@ -11,6 +48,17 @@ class UserError(Exception):
     """
 
     status = 2
+
+    def __str__(self) -> str:
+        return self.clean(super().__str__())
+
+    @staticmethod
+    def clean(line: str) -> str:
+        """A line without control characters, long words and quoted texts shortened in the middle."""
+        line = escaped(_BREAK.sub(" ", line))
+        line = _LONG_QUOTE.sub(lambda found: _short_path(found.group()), line)
+        line = _LONG_WORD.sub(lambda found: _short_path(found.group()), line)
+        return _shortened(line, MOST_LINE)
 
 
 class RunError(UserError):
@@ -40,7 +88,7 @@ class FieldError(UserError):
 
     def line(self, name: str) -> str:
         """The line that the user sees, with another name of the field."""
-        return f"{self._source}: {name} {self._problem}" if self._source else f"{name} {self._problem}"
+        return self.clean(f"{self._source}: {name} {self._problem}" if self._source else f"{name} {self._problem}")
 
     def __str__(self) -> str:
         return self.line(self.field)

@@ -18,7 +18,7 @@ BELOW: dict[str, set[str]] = {
     "model": {"foundation", "levels"},
     "solve": {"foundation", "levels", "model"},
     # Bags know neither sections of YAML files nor declared parameters.
-    "bags": {"foundation.arrays"},
+    "bags": {"foundation.arrays", "foundation.yaml_text"},
     "signals": {"foundation", "bags"},
     "analysis": SCIENCE,
     "exchange": SCIENCE,

@@ -16,11 +16,10 @@ import zstandard
 from rosbags.rosbag2 import storage_mcap
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from limb_nodes.bags.folder import PACKED, is_bag_file
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.yaml_text import read_yaml
 
 BagFile = McapReader | Sqlite3Reader
 
@@ -98,10 +97,10 @@ def _listed(metadata: Path) -> list[Path]:
     """The files that a metadata.yaml names."""
     folder = metadata.parent
     try:
-        content = YAML(typ="safe", pure=True).load(metadata.read_text(encoding="utf-8"))
+        content, _ = read_yaml(metadata)
         information = content["rosbag2_bagfile_information"]
         names = [PurePath(name).name for name in information["relative_file_paths"]]
-    except (OSError, YAMLError, UnicodeDecodeError, KeyError, TypeError) as error:
+    except (UserError, KeyError, TypeError) as error:
         raise UserError(
             f"{folder}: is no bag that can be read, for its metadata.yaml is damaged: {one_line(error)}; a bag is read "
             "without that file too"

@@ -15,15 +15,14 @@ import numpy as np
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 from rosbags.typesys.store import Typestore
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from limb_nodes.bags.columns import Columns, columns
 from limb_nodes.bags.fields import Block, blocks, kinds
 from limb_nodes.bags.files import BagFile, most_bytes, one_line, open_files, unpack_message
-from limb_nodes.bags.types import RUN_INFO, absolute, typestore_of
+from limb_nodes.bags.types import RUN_INFO, RUN_INFO_BYTES, absolute, typestore_of
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import IntArray
+from limb_nodes.foundation.yaml_text import parse_yaml
 
 _BATCH = 2**15
 _FIRST, _LAST = -(2**63), 2**63 - 1
@@ -90,10 +89,8 @@ class BagReader:
             UserError: the bag has none, or it is not a mapping in YAML.
         """
         for _, message in self.read_topic(RUN_INFO):
-            try:
-                info = YAML(typ="safe", pure=True).load(message.data)
-            except YAMLError:
-                info = None
+            text = getattr(message, "data", None)
+            info = parse_yaml(text, f"{self.path}: {RUN_INFO}", RUN_INFO_BYTES) if isinstance(text, str) else None
             if isinstance(info, dict):
                 return info
             raise UserError(f"{self.path}: {RUN_INFO} is no mapping in YAML; a bag that limb wrote is needed")

@@ -18,6 +18,8 @@ from limb_nodes.errors import UserError
 STORE = getattr(Stores, "ROS2_KILTED", Stores.LATEST)
 RUN_INFO = "run_info"
 """The topic on which a bag holds what is needed to run it again, as a std_msgs/String in YAML."""
+RUN_INFO_BYTES = 2**22
+"""It holds a limb's file and the files of its laws."""
 
 
 def message_folder() -> Path:

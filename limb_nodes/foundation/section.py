@@ -2,47 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
-
-from limb_nodes.errors import UserError
+from limb_nodes.errors import MOST, UserError, shown
 from limb_nodes.foundation.parameter import Parameter, is_finite
-
-
-def read_yaml(path: Path) -> tuple[Any, str]:
-    """Content and text of a YAML 1.2 file; UserError if it cannot be read."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise UserError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as problem:
-        raise UserError(f"{path}: cannot be read: {problem}") from None
-    return parse_yaml(text, str(path)), text
-
-
-def parse_yaml(text: str, file: str) -> Any:
-    """Content of YAML text; UserError with the line of the first mistake."""
-    try:
-        return YAML(typ="safe", pure=True).load(text)
-    except MarkedYAMLError as problem:
-        mark = problem.problem_mark
-        line = f", line {mark.line + 1}" if mark else ""
-        raise UserError(f"{file}{line}: not YAML: {one_line(problem.problem)}") from None
-    except (YAMLError, ValueError) as problem:
-        # ValueError: a date or a tagged number that is none.
-        raise UserError(f"{file}: not YAML: {one_line(problem)}") from None
-
-
-def yaml_text(content: Any) -> str:
-    """The YAML text of plain data."""
-    stream: io.StringIO = io.StringIO()
-    YAML(typ="safe", pure=True).dump(content, stream)
-    return str(stream.getvalue())
 
 
 def one_line(text: object) -> str:
@@ -63,8 +27,10 @@ class Section:
         if not isinstance(content, Mapping):
             self.fail("", f"is {describe(content)}; a mapping of keys is needed")
         for key in content:
-            if not isinstance(key, str):
-                self.fail("", f"has the key {describe(key)}; keys are texts")
+            if not isinstance(key, str) or not _fits(key, MOST):
+                self.fail(
+                    "", f"has the key {describe(key)}; keys are texts of {MOST} signs at most that can be printed"
+                )
         self.content: dict[str, Any] = dict(content)
         self._taken: set[str] = set()
 
@@ -89,8 +55,8 @@ class Section:
         self._taken.add(key)
         return self.content.get(key)
 
-    def text(self, key: str, default: str | None = None) -> str:
-        """A text that is not empty."""
+    def text(self, key: str, default: str | None = None, most: int = MOST) -> str:
+        """A text that is not empty, of `most` signs at most, all of which can be printed."""
         value = self.take(key)
         if value is None and default is not None:
             return default
@@ -98,6 +64,8 @@ class Section:
             if value is None:
                 self.fail(key, "is missing; a text is needed")
             self.fail(key, f"is {describe(value)}; a text is needed")
+        if not _fits(value, most):
+            self.fail(key, f"is {describe(value)}; a text of {most} signs at most that can be printed is needed")
         return str(value)
 
     def choice(self, key: str, allowed: Iterable[str], default: str | None = None) -> str:
@@ -165,5 +133,8 @@ def describe(value: Any) -> str:
     """A value in an error message, shortened."""
     if value is None:
         return "empty"
-    text = one_line(repr(value) if isinstance(value, str) else value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return shown(repr(value) if isinstance(value, str) else value, 60)
+
+
+def _fits(text: str, most: int) -> bool:
+    return len(text) <= most and text.isprintable()

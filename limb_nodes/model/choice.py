@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from limb_nodes.errors import MOST_PATH
 from limb_nodes.foundation.section import Section, one_line
 from limb_nodes.levels import CONTRACTS, REGISTRY, Law
 from limb_nodes.model.chosen import ChosenLaw
@@ -50,7 +51,7 @@ def read_law(section: Section, process: str) -> ChosenLaw:
 def find_law(section: Section, process: str) -> tuple[Law, str]:
     """The law that `section.law` names, and the user's module that it is in. Raises UserError."""
     known = REGISTRY[process]
-    name = section.text("law", CONTRACTS[process].default)
+    name = section.text("law", CONTRACTS[process].default, MOST_PATH)
     if name in known:
         return known[name], ""
     if ":" not in name:

@@ -12,7 +12,8 @@ from typing import Any
 
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.parameter import Parameter
-from limb_nodes.foundation.section import Section, parse_yaml, read_yaml, yaml_text
+from limb_nodes.foundation.section import Section
+from limb_nodes.foundation.yaml_text import parse_yaml, read_yaml, yaml_text
 from limb_nodes.levels import CONTRACTS, MUSCLE_PROCESSES, UNIT_PROCESSES, motor_unit
 from limb_nodes.levels.motor_unit.recruitment import unit_thresholds
 from limb_nodes.model.check import check_geometry, check_unit

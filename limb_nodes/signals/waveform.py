@@ -19,7 +19,8 @@ import numpy as np
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.parameter import Parameter
-from limb_nodes.foundation.section import Section, describe, read_yaml
+from limb_nodes.foundation.section import Section, describe
+from limb_nodes.foundation.yaml_text import read_yaml
 
 Numbers = Mapping[str, float]
 

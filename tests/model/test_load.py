@@ -339,10 +339,10 @@ def test_files_that_cannot_be_read(tmp_path):
         load_limb(missing)
     binary = tmp_path / "binary.yaml"
     binary.write_bytes(b"name: \xff\xfe\n")
-    for path in (tmp_path, binary):
+    for path, part in ((tmp_path, ": cannot be read"), (binary, ", line 1: is not UTF-8")):
         with pytest.raises(UserError) as caught:
             load_limb(path)
-        assert one_line(caught.value).startswith(f"{path}: cannot be read")
+        assert one_line(caught.value).startswith(f"{path}{part}")
 
 
 class TestWithValues:

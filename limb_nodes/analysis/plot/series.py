@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from limb_nodes.bags.read import BagReader
-from limb_nodes.bags.types import RUN_INFO
+from limb_nodes.bags.types import RUN_INFO, RUN_INFO_BYTES
 from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.topics import TOPIC_TYPES
+from limb_nodes.foundation.yaml_text import parse_yaml
 from limb_nodes.model import Limb, parse_limb
 from limb_nodes.signals.envelope_bag import ANGLE_TOPIC, ENVELOPE_TOPIC, RAW_TOPIC, read_raw
 
@@ -145,8 +144,8 @@ class _Bag:
             return {}
         _, message = next(self.reader.read_topic(topic))
         try:
-            info = YAML(typ="safe", pure=True).load(message.data)
-        except (YAMLError, AttributeError):
+            info = parse_yaml(message.data, topic, RUN_INFO_BYTES)
+        except (UserError, AttributeError):
             info = None
         return info if isinstance(info, dict) else {}
 
