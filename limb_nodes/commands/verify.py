@@ -99,7 +99,7 @@ def make_folder(folder: str) -> Path:
 def run_case(case: Case, limb: Limb, way: str) -> Trajectory | None:
     """Run a case one way; None, and a line, if the equations cannot be solved."""
     from limb_nodes.analysis.verification import solve_whole
-    from limb_nodes.solve.whole import SolveError
+    from limb_nodes.solve.failure import SolveError
 
     try:
         return solve_whole(case, limb) if way == "whole" else solve_graph(case, limb)
@@ -115,7 +115,7 @@ def solve_graph(case: Case, limb: Limb) -> Trajectory:
     from limb_nodes.foundation.topics import STATES
     from limb_nodes.nodes.session import run_in_one_process
     from limb_nodes.nodes.settings import RunSettings
-    from limb_nodes.solve.whole import SolveError
+    from limb_nodes.solve.failure import SolveError
 
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     with tempfile.TemporaryDirectory(prefix="limb_verify_") as folder:

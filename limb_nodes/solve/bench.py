@@ -21,10 +21,11 @@ from limb_nodes.levels.sarcomere.lengths import optimal_sarcomere_length
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.layout import build_layout, same_structure
 from limb_nodes.model.limb import Limb, Muscle, Segment
+from limb_nodes.solve.failure import SolveError
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import straight
 from limb_nodes.solve.stepping import MuscleStepper
-from limb_nodes.solve.whole import SolveError, WholeModel
+from limb_nodes.solve.whole import WholeModel
 
 # Nothing moves it and it moves nothing: the program wants a joint for the muscle to cross.
 SUPPORT = Segment("bench", "bench", 1.0, 1.0, 0.5, 1.0, 0.0, 0.0, None)

@@ -17,6 +17,7 @@ def data_type(layout: Layout) -> np.dtype[Any]:
     """The type of a limb's data, of n joints; everything is float64.
 
     period: time between two samples of the input (s), the first of which is at 0 s.
+    first: the number of the first of the input's pieces that are there, 0 for those from 0 s on.
     load: [3], force on the tip in x and y (N) and torque on it (N m).
     locked: [n], 1 or -1 while a joint rests on its highest or lowest angle, else 0.
     torque: [n], of the muscles about each joint (N m). acceleration: [n], of the joints (rad/s^2).
@@ -50,4 +51,4 @@ def data_type(layout: Layout) -> np.dtype[Any]:
         "rates_t": states,
     }
     arrays = [(name, np.float64, size if isinstance(size, tuple) else (size,)) for name, size in sizes.items()]
-    return np.dtype([("period", np.float64), *arrays])
+    return np.dtype([("period", np.float64), ("first", np.float64), *arrays])

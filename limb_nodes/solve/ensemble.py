@@ -18,8 +18,9 @@ from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.limb import Limb
 from limb_nodes.model.load import build_limb
+from limb_nodes.solve.course import METHODS, Stretch, stretch_of
 from limb_nodes.solve.variants import Values, Variants
-from limb_nodes.solve.whole import METHODS, TOLERANCE, Movement, Stretch, WholeModel, prepared
+from limb_nodes.solve.whole import TOLERANCE, Movement, WholeModel
 
 Samples = Iterable[Values] | Mapping[str, FloatArray]
 Task = TypeVar("Task")
@@ -75,13 +76,14 @@ class SampleSolver:
         # The solution starts with the input, whether its start is asked for or not.
         self.early = bool(asked[0] > 0.0)
         self.times: FloatArray = np.concatenate([[0.0], asked]) if self.early else np.ascontiguousarray(asked)
-        self.inputs = self.prepared(self.variants.base)
+        self.stretch = self.prepared(self.variants.base)
         # One method for all: to find how stiff a limb is takes a part of the time of solving it.
         self.method = self.variants.base.suited_method if order.method == "auto" else order.method
 
-    def prepared(self, model: WholeModel) -> tuple[FloatArray, FloatArray]:
-        """The input as pieces, and the times of its corners."""
-        return prepared(model.drives(self.order.excitation), self.period)
+    def prepared(self, model: WholeModel) -> Stretch:
+        """The whole input, and the times that are asked for."""
+        drives = model.drives(self.order.excitation)
+        return stretch_of(drives, 0, self.times, self.period, 0, len(drives))
 
     def solve(self, values: Values) -> Any:
         """What is asked of a sample, or the exception that kept it from being solved."""
@@ -93,8 +95,7 @@ class SampleSolver:
                     model.simulate(order.excitation, order.rate, tolerance=order.tolerance, method=self.method)
                 )
             same = self.variants.same_drives(model)
-            inputs, stops = self.inputs if same else self.prepared(model)
-            stretch = Stretch(self.times, inputs, stops, self.period)
+            stretch = self.stretch if same else self.prepared(model)
             states, steps = model.solve(stretch, order.tolerance, self.method)
             n, first = model.layout.joints, int(self.early)
             kept = states[first:]

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, types
+from numba import carray, njit, types
 
 from limb_nodes.solve.inner import inner
 from limb_nodes.solve.limits import NOTHING
-from limb_nodes.solve.pointer import f8, i8, invoke, record_at
+from limb_nodes.solve.pointer import f8, i8, invoke, numbers_at, record_at
 from limb_nodes.solve.problem import (
     NEW_STATE,
     SCALE,
@@ -30,7 +30,7 @@ from limb_nodes.solve.problem import (
 
 vector, table = f8[::1], f8[:, ::1]
 
-DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2, 3
+DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE, PAUSED = 0, 1, 2, 3, 4
 # Steps per second of movement, at least for one second, after which the solver gives up.
 MOST_STEPS = 1e6
 
@@ -96,11 +96,12 @@ def fill(t, h, row, times, out, method, work, problem):
     nogil=True,
 )
 def integrate(method_, problem_, control_, stops, scale, y, times, out):
-    """Advance y [states] in place from `control.start` to `control.end`; a status.
+    """Advance y [states] in place from `control.start`, or where it paused, to `control.end`; a status.
 
     method_, problem_, control_: addresses of the records.
     stops: times (rising) that no step may cross: kinks of the input. scale: typical sizes of the states.
-    times, out: rising times within, and the states there [times, states].
+    times, out: rising times within, and the states there [times, states]. A solve that paused goes on with the times
+    behind those that it has reached, and takes the same steps as one that never pauses.
     """
     method, problem = record_at(method_, method_type), record_at(problem_, problem_type)
     control = record_at(control_, control_type)
@@ -109,22 +110,30 @@ def integrate(method_, problem_, control_, stops, scale, y, times, out):
     state, start_rates = work[STATE], work[START_RATES]
     copy(y, state)
     copy(scale, work[SCALE])
-    t = control.start
+    rest = carray(numbers_at(control.rest), (problem.states,))
     row, stop = 0, 0
-    while row < times.size and times[row] <= t:
-        copy(y, out[row])
-        row += 1
-    if problem.joints > 0:
-        invoke(method.settle, t, method, work, problem)
-    evaluate(problem.rates, t, state, problem, start_rates)
     fresh = False
-    h = control.next_step if control.next_step > 0.0 else min(control.longest, span) * 0.01
-    h = min(h, control.longest)
-    last_error = 1e-4
-    control.steps = control.rejected = 0
-    control.quiet_until = control.start
+    if control.paused:
+        t, h, last_error = control.time, control.next_step, control.last_error
+        copy(rest, start_rates)
+    else:
+        t = control.start
+        while row < times.size and times[row] <= t:
+            copy(y, out[row])
+            row += 1
+        if problem.joints > 0:
+            invoke(method.settle, t, method, work, problem)
+        evaluate(problem.rates, t, state, problem, start_rates)
+        h = control.next_step if control.next_step > 0.0 else min(control.longest, span) * 0.01
+        h = min(h, control.longest)
+        last_error = 1e-4
+        control.steps = control.rejected = 0
+        control.quiet_until = control.start
     status = DONE
     while t < end:
+        if control.rest != 0 and t >= control.pause:
+            status = PAUSED
+            break
         if control.steps + control.rejected > MOST_STEPS * max(1.0, span):
             status = TOO_MANY_STEPS
             break
@@ -177,8 +186,13 @@ def integrate(method_, problem_, control_, stops, scale, y, times, out):
     copy(state, y)
     control.time = t
     control.next_step = h
+    control.last_error = last_error
+    control.paused = status == PAUSED
+    if status == PAUSED:
+        copy(start_rates, rest)
     if status == DONE:
         while row < times.size:
             copy(y, out[row])
             row += 1
+    control.rows = row
     return status

@@ -17,6 +17,8 @@ LEAST_CORNER = 1e-4
 CORNER_RATIO = 4.0
 # The second difference above which three samples alone are taken for a corner.
 STEEPEST_BEND = 1e-2
+# A piece and a corner are known by so many samples on both sides.
+REACH = 8
 
 
 @njit(cache=True)

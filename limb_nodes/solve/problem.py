@@ -41,14 +41,18 @@ PROBLEM = whole_numbers(
 METHOD = whole_numbers("step", "between", "tableau", "stages", "implicit", "settle", "find_event", "take_effect")
 
 # Given: start, end: s. tolerance: of a step's error, relative to a state's size. longest: greatest step (s).
-# Given and told: next_step: size of the step that comes next (s), chosen by the integrator if 0.
-# Told: time: reached (s). error: of the last step over its tolerance. steps, rejected: how many. event, joint:
-# what ended the last step, and which joint. quiet_until: until then no joint is released (s).
+# pause: time (s) at or behind which the solve pauses, at the end of a step; rest: address of the rates [states] that a
+# paused solve goes on with, 0 if it is never to pause.
+# Given and told: next_step: size of the step that comes next (s), chosen by the integrator if 0. paused: whether the
+# solve goes on where it paused.
+# Told: time: reached (s). rows: how many of the wanted times were reached. error: of the last step over its tolerance;
+# last_error: of the one before. steps, rejected: how many. event, joint: what ended the last step, and which joint.
+# quiet_until: until then no joint is released (s).
 CONTROL = np.dtype(
     [
-        *((name, np.float64) for name in ("start", "end", "tolerance", "longest")),
-        *((name, np.float64) for name in ("next_step", "time", "error", "quiet_until")),
-        *((name, np.int64) for name in ("steps", "rejected", "event", "joint")),
+        *((name, np.float64) for name in ("start", "end", "tolerance", "longest", "pause")),
+        *((name, np.float64) for name in ("next_step", "time", "error", "last_error", "quiet_until")),
+        *((name, np.int64) for name in ("steps", "rejected", "event", "joint", "rest", "paused", "rows")),
     ]
 )
 

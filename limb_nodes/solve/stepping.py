@@ -15,13 +15,14 @@ from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.records import Record
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve.explicit import EXPLICIT
+from limb_nodes.solve.failure import FAILURES, SolveError
 from limb_nodes.solve.held import hold, predict
 from limb_nodes.solve.integrate import DONE, integrate
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import bent, straight
 from limb_nodes.solve.problem import CONTROL, give_inputs, new_problem
 from limb_nodes.solve.small import same
-from limb_nodes.solve.whole import FAILURES, SolveError, WholeModel
+from limb_nodes.solve.whole import WholeModel
 
 TICK_TOLERANCE = 1e-9
 NO_TIMES = np.empty(0)

@@ -2,56 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from limb_nodes.errors import UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.records import Record
 from limb_nodes.model.chain import LOWEST
 from limb_nodes.model.layout import Layout, build_layout
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve.compile import compiled
+from limb_nodes.solve.course import Course, Input, Stretch, stretches
 from limb_nodes.solve.data import data_type
 from limb_nodes.solve.drive_table import DriveTable
-from limb_nodes.solve.explicit import EXPLICIT
-from limb_nodes.solve.implicit import IMPLICIT
-from limb_nodes.solve.integrate import (
-    DONE,
-    NOT_FINITE,
-    STEP_TOO_SMALL,
-    TOO_MANY_STEPS,
-    difference_slopes,
-    integrate,
-)
+from limb_nodes.solve.integrate import difference_slopes
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
-from limb_nodes.solve.pieces import corners, pieces
-from limb_nodes.solve.problem import CONTROL, give_inputs, new_problem
+from limb_nodes.solve.pieces import pieces
+from limb_nodes.solve.problem import give_inputs, new_problem
 
 ANGLE_SCALE, VELOCITY_SCALE = 1.0, 10.0
 TOLERANCE = 1e-9
-LONGEST_STEP = 0.1
 # Samples from which a table of the drives costs less than their laws, and from which it does so even if it has to be
 # compiled for one solve.
 TABLE_PAYS = 2_000
 TABLE_PAYS_ONCE = 1_000_000
-METHODS = {"explicit": EXPLICIT, "implicit": IMPLICIT}
 # Rate (1/s) from which steps that accuracy allows would be unstable with the explicit method.
 STIFF = 2000.0
-FAILURES = {
-    TOO_MANY_STEPS: "it needs too many steps",
-    STEP_TOO_SMALL: "the step became too small",
-    NOT_FINITE: "a rate is not a finite number",
-}
-
-
-class SolveError(UserError):
-    """The equations could not be solved further; says when and why."""
+# Numbers of a part of a movement that is solved piece by piece, and most of its instants.
+PART, LONGEST_PART = 2**18, 2048
 
 
 @dataclass(frozen=True)
@@ -74,19 +56,6 @@ class Movement:
     muscle: dict[str, FloatArray]
     unit: dict[str, FloatArray]
     steps: tuple[int, int]
-
-
-class Stretch(NamedTuple):
-    """A part of a movement that is to be solved.
-
-    times: s [T], rising, at which the states are wanted. inputs: pieces of the drives [rows, 4 drives], the first
-    from 0 s on. stops: times (s) of their corners. period: of a piece (s).
-    """
-
-    times: FloatArray
-    inputs: FloatArray
-    stops: FloatArray
-    period: float
 
 
 class WholeModel:
@@ -204,8 +173,16 @@ class WholeModel:
 
     def drives(self, excitation: FloatArray) -> FloatArray:
         """What the input [T, muscles] does to muscles and motor units [T, drives]."""
+        return self._drives(excitation, len(excitation))
+
+    def _drives_of(self, excitation: Input, start: int, end: int) -> FloatArray:
+        """The drives of a part of an input."""
+        return self._drives(excitation[start:end], len(excitation))
+
+    def _drives(self, excitation: FloatArray, count: int) -> FloatArray:
+        """The drives of a part of an input of `count` samples."""
         given = np.ascontiguousarray(excitation, dtype=np.float64)
-        if len(given) >= self.table_pays:
+        if count >= self.table_pays:
             return self.drive_table.look_up(given)
         out = np.zeros((len(given), self.layout.drives))
         self.program.drives(given, self.layout.model.address, out)
@@ -219,7 +196,7 @@ class WholeModel:
 
     def simulate(
         self,
-        excitation: FloatArray,
+        excitation: Input,
         rate: float,
         *,
         tolerance: float = TOLERANCE,
@@ -236,21 +213,66 @@ class WholeModel:
             those have no rows.
         Raises SolveError if the equations cannot be solved further.
         """
-        period = 1.0 / rate
-        times: FloatArray = np.arange(len(excitation), dtype=np.float64) * period
-        stretch = Stretch(times, *prepared(self.drives(excitation), period), period)
-        states, steps = self.solve(stretch, tolerance, method)
-        n, layout = self.layout.joints, self.layout
-        shown = len(times) if observe else 0
+        (movement,) = self._parts(excitation, rate, len(excitation), tolerance, method, observe)
+        return movement
+
+    def simulate_in_parts(
+        self,
+        excitation: Input,
+        rate: float,
+        *,
+        tolerance: float = TOLERANCE,
+        method: str = "auto",
+        observe: bool = True,
+    ) -> Iterator[Movement]:
+        """The movement of `simulate`, the same numbers, in parts one after another, which do not grow with its length.
+
+        Of each part, `steps` are those from the start on. Raises SolveError behind the last instant that was reached.
+        """
+        shown = self.layout.muscles * len(MUSCLE_OUTPUTS) + self.layout.units * len(UNIT_OUTPUTS)
+        numbers = 4 * self.state_scale.size + 4 * self.layout.drives + (2 * shown if observe else 0)
+        return self._parts(excitation, rate, min(LONGEST_PART, PART // numbers + 1), tolerance, method, observe)
+
+    def _parts(
+        self, excitation: Input, rate: float, rows: int, tolerance: float, method: str, observe: bool
+    ) -> Iterator[Movement]:
+        """The movement in parts of so many instants, or somewhat more."""
+        period, count = 1.0 / rate, len(excitation)
+        course = Course(self, (count - 1) * period, period, tolerance, method)
+        # The search for the fibre force starts at that of the instant before: two records, each for one kind of search.
+        seen = self.new_data(period), self.new_data(period)
+        drives = partial(self._drives_of, excitation)
+        done = 0
+        for stretch, pause in stretches(drives, count, period, rows, course):
+            states = course.advance(stretch, pause)
+            given = excitation[done : done + len(states)]
+            done += len(states)
+            yield self._movement(stretch, states, given, seen if observe else (), course.steps)
+        if course.failure is not None:
+            raise course.failure
+
+    def _movement(
+        self,
+        stretch: Stretch,
+        states: FloatArray,
+        excitation: FloatArray,
+        seen: tuple[Record, ...],
+        steps: tuple[int, int],
+    ) -> Movement:
+        """The states [T, states] from the first time of a stretch on as a movement; seen: data to observe it with."""
+        n, layout, times = self.layout.joints, self.layout, stretch.times[: len(states)]
+        shown = len(states) if seen else 0
         acceleration = np.empty((shown, n))
         muscle = np.zeros((shown, layout.muscles, len(MUSCLE_OUTPUTS)))
         unit = np.zeros((shown, layout.units, len(UNIT_OUTPUTS)))
-        if observe:
-            data = self.new_data(period)
-            records = layout.model.address, data.address
-            self.program.accelerations(times, states, stretch.inputs, *records, acceleration)
+        if seen:
+            moving, still = seen
+            moving.first[0] = stretch.first
+            self.program.accelerations(
+                times, states, stretch.inputs, layout.model.address, moving.address, acceleration
+            )
             given = np.ascontiguousarray(excitation, dtype=np.float64)
-            self.program.observe_all(states, given, *records, muscle, unit)
+            self.program.observe_all(states, given, layout.model.address, still.address, muscle, unit)
         return Movement(
             time=times,
             angle=states[:, :n],
@@ -269,29 +291,8 @@ class WholeModel:
 
         tolerance, method: as for `simulate`. Raises SolveError.
         """
-        state = self.initial_state()
-        out = np.empty((len(stretch.times), state.size))
-        chosen = METHODS[self.suited_method if method == "auto" else method]
-        data = self.new_data(stretch.period)
-        problem = self.problem(data, jacobian=chosen.implicit)
-        give_inputs(problem, stretch.inputs)
-        control = Record(CONTROL)
-        control.start[0], control.end[0] = stretch.times[0], stretch.times[-1]
-        control.tolerance[0], control.longest[0] = tolerance, LONGEST_STEP
-        how = chosen.limited if self.limited else chosen.free
-        status = integrate(
-            how.address, problem.address, control.address, stretch.stops, self.state_scale, state, stretch.times, out
-        )
-        if status != DONE:
-            raise SolveError(f"{self.limb.file}: the solution stops at {control.time[0]:.6g} s: {FAILURES[status]}")
-        return out, (int(control.steps[0]), int(control.rejected[0]))
-
-
-def prepared(samples: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:
-    """Pieces of sampled drives [T, drives], and the times (s) of the samples at which one has a corner.
-
-    A step of high order must not cross such a time: it would not notice.
-    """
-    sharp = corners(samples)
-    rows = np.unique(np.flatnonzero(sharp) // max(1, samples.shape[1]))
-    return pieces(samples, sharp), rows.astype(np.float64) * period
+        course = Course(self, float(stretch.times[-1]), stretch.period, tolerance, method)
+        states = course.advance(stretch)
+        if course.failure is not None:
+            raise course.failure
+        return states, course.steps

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from limb_nodes.solve.limits import crossing
 from limb_nodes.solve.pieces import pieces
-from limb_nodes.solve.whole import SolveError
+from limb_nodes.solve.failure import SolveError
 
 RATE = 1000.0
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from limb_nodes.solve.stepping import LimbStepper, MuscleStepper
-from limb_nodes.solve.whole import SolveError
+from limb_nodes.solve.failure import SolveError
 
 
 def run(limb, excitation: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray, MuscleStepper]:

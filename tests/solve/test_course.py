@@ -1,0 +1,83 @@
+"""A movement that is solved in parts is the one that is solved at once, to the last bit; a failure says where and why."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from limb_nodes.model import load_limb
+from limb_nodes.solve import whole
+from limb_nodes.solve.failure import SolveError
+from limb_nodes.solve.whole import WholeModel
+
+LIMBS = ["reference_joint", "reference_joint_tendon", "seated_knee", "arm", "pennate_leg"]
+LAW = """
+from limb_nodes.levels import law
+
+@law("force_length", source="a law that breaks off")
+def broken(fibre_length_norm: float) -> float:
+    \"\"\"Force-length factor (1).\"\"\"
+    return 1.0 if fibre_length_norm > {edge} else math.nan
+"""
+
+
+def bursts(model, count: int, rate: float) -> np.ndarray:
+    """Sines that start and stop at once, so that there are corners."""
+    time = np.arange(count) / rate
+    columns = [
+        np.clip(np.sin((3.0 + m) * time + m), 0.0, 1.0) * (time % 0.7 > 0.2) for m in range(len(model.limb.muscles))
+    ]
+    return np.stack(columns, axis=1)
+
+
+def flat(movement) -> dict[str, np.ndarray]:
+    """Every array of a movement by name."""
+    fields = {field.name: getattr(movement, field.name) for field in dataclasses.fields(movement)}
+    parts = {f"{kind}.{name}": values for kind in ("muscle", "unit") for name, values in fields.pop(kind).items()}
+    del fields["state_names"], fields["steps"]
+    return fields | parts
+
+
+@pytest.mark.parametrize("name", LIMBS)
+@pytest.mark.parametrize("method", ["explicit", "implicit"])
+@pytest.mark.parametrize(("rate", "longest"), [(1000.0, 1), (1000.0, 333), (120.0, 50)])
+def test_parts_are_the_whole(name, method, rate, longest, model_named, monkeypatch):
+    model = model_named(name)
+    excitation = bursts(model, round(2.2 * rate), rate)
+    at_once = model.simulate(excitation, rate, method=method)
+    monkeypatch.setattr(whole, "LONGEST_PART", longest)
+    parts = list(model.simulate_in_parts(excitation, rate, method=method))
+    assert len(parts) > 3
+    assert parts[-1].steps == at_once.steps
+    for key, values in flat(at_once).items():
+        np.testing.assert_array_equal(np.concatenate([flat(part)[key] for part in parts]), values, err_msg=key)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8])
+def test_short_inputs(count, model_named):
+    model = model_named("reference_joint")
+    excitation = np.full((count, 2), 0.3)
+    (part,) = model.simulate_in_parts(excitation, 1000.0)
+    np.testing.assert_array_equal(part.angle, model.simulate(excitation, 1000.0).angle)
+    assert len(part.time) == count
+
+
+def test_a_long_input_takes_its_drives_from_the_table_in_every_part(model_named, monkeypatch):
+    model = model_named("arm")
+    excitation = bursts(model, 2500, 1000.0)
+    assert len(excitation) >= model.table_pays
+    monkeypatch.setattr(whole, "LONGEST_PART", 500)
+    found = np.concatenate([part.angle for part in model.simulate_in_parts(excitation, 1000.0)])
+    np.testing.assert_array_equal(found, model.simulate(excitation, 1000.0).angle)
+
+
+def broken_limb(folder: Path, edge: float) -> WholeModel:
+    """The reference joint with a law that gives NaN for fibres shorter than an edge."""
+    text = Path("params/reference_joint.yaml").read_text()
+    head, _, tail = text.partition("    force_length:\n")
+    (folder / "breaks_off.py").write_text("import math\n" + LAW.format(edge=edge))
+    lines = tail.splitlines(keepends=True)
+    kept = next(i for i, line in enumerate(lines) if not line.startswith("      "))
+    (folder / "limb.yaml").write_text(f"{head}    force_length:\n      law: breaks_off:broken\n{''.join(lines[kept:])}")
+    return WholeModel(load_limb(folder / "limb.yaml"))
