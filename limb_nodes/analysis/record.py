@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,10 @@ from limb_nodes.foundation.topics import LATCHED_TOPICS, TOPIC_TYPES
 from limb_nodes.model import Limb
 from limb_nodes.model.points import point_names, points
 from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, UNIT_FIELDS
-from limb_nodes.solve.whole import Movement, WholeModel
+from limb_nodes.solve.whole import Movement
+
+# Bytes that wait for the writer while the solve goes on.
+MOST_WAITING = 2**22
 
 
 class Topic(NamedTuple):
@@ -26,23 +30,42 @@ class Topic(NamedTuple):
     numbers: Mapping[str, NDArray[Any]]
 
 
-def write_movement(
-    path: str | Path, model: WholeModel, movement: Movement, rate: float, run_info: Mapping[str, Any]
-) -> None:
-    """Write every instant of a movement on every topic of a run; slopes of the torque are left empty.
+class MovementBag:
+    """A bag that is being written of the parts of a movement; a context manager, as `BagWriter`, and closed likewise.
 
-    rate: of the instants, Hz. Raises UserError if the folder exists or cannot be made.
+    count: of all instants of the movement. rate: of the instants, Hz.
+    Raises UserError if the folder exists or cannot be made.
     """
-    stamps = np.arange(len(movement.time), dtype=np.int64) * round(1e9 / rate)
-    with BagWriter(path, run_info, latched=LATCHED_TOPICS) as writer:
-        for topic in (*movement_topics(model.limb, movement), *state_topics(model.limb, movement)):
-            write_table(writer, topic.name, TOPIC_TYPES[topic.name], stamps, topic.names, topic.numbers)
+
+    def __init__(self, path: str | Path, limb: Limb, count: int, rate: float, run_info: Mapping[str, Any]) -> None:
+        self._limb, self._count, self._period = limb, count, round(1e9 / rate)
+        self._done = 0
+        self._writer = BagWriter(path, run_info, latched=LATCHED_TOPICS, most_waiting=MOST_WAITING)
+
+    def write(self, part: Movement) -> None:
+        """Write every instant of the next part on every topic of a run; slopes of the torque are left empty.
+
+        Raises RunError if it cannot be written.
+        """
+        tick = np.arange(self._done, self._done + len(part.time), dtype=np.uint64)
+        self._done += len(tick)
+        stamps = tick.astype(np.int64) * self._period
+        for topic in (*movement_topics(self._limb, part, tick, self._count - 1), *state_topics(self._limb, part, tick)):
+            write_table(self._writer, topic.name, TOPIC_TYPES[topic.name], stamps, topic.names, topic.numbers)
+
+    def __enter__(self) -> MovementBag:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._writer.__exit__(kind, error, trace)
 
 
-def movement_topics(limb: Limb, movement: Movement) -> list[Topic]:
-    """What goes between the nodes, and the movement pattern."""
-    count = len(movement.time)
-    tick, last = np.arange(count, dtype=np.uint64), np.full(count, count - 1)
+def movement_topics(limb: Limb, movement: Movement, tick: NDArray[np.uint64], last_tick: int) -> list[Topic]:
+    """What goes between the nodes, and the movement pattern, at ticks [T]."""
+    count = len(tick)
+    last = np.full(count, last_tick)
     joints, muscles, names = limb.joint_names, limb.muscle_names, point_names(limb)
     torque = np.zeros((count, len(joints)))
     for index, muscle in enumerate(limb.muscles):
@@ -66,11 +89,10 @@ def movement_topics(limb: Limb, movement: Movement) -> list[Topic]:
     ]
 
 
-def state_topics(limb: Limb, movement: Movement) -> list[Topic]:
-    """The states of muscles, motor units and sarcomeres; none of a limb without muscles."""
+def state_topics(limb: Limb, movement: Movement, tick: NDArray[np.uint64]) -> list[Topic]:
+    """The states of muscles, motor units and sarcomeres at ticks [T]; none of a limb without muscles."""
     if not limb.muscles:
         return []
-    tick = np.arange(len(movement.time), dtype=np.uint64)
     owners = [muscle.name for muscle in limb.muscles for _ in muscle.units]
     units = {"muscle": owners, "unit": [unit.name for muscle in limb.muscles for unit in muscle.units]}
     return [

@@ -9,7 +9,7 @@ from pathlib import Path
 import zstandard
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from rosbags.rosbag2.storage_mcap import McapWriter
+from rosbags.rosbag2.storage_mcap import McapWriter, write_channel, write_schema
 
 _ZSTD_LEVEL = 3
 # A message's record in MCAP: opcode, length of the rest, channel, sequence, log time, publish time.
@@ -37,6 +37,7 @@ class Storage(Writer):
         super().__init__(path, version=self.VERSION_LATEST, storage_plugin=StoragePlugin.MCAP)
         if compressed:
             self.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        self._announced = 0
         self.open()
         if compressed:
             # With a checksum, so that readers notice damage; the library's own compressor writes none.
@@ -62,10 +63,18 @@ class Storage(Writer):
                 mcap.close_chunk()
 
     def flush(self) -> None:
-        """Bring what has been written to the disk."""
-        if self._mcap.chunk.msgs:
-            self._mcap.close_chunk()
-        self._mcap.bio.flush()
+        """Bring what has been written to the disk, and what a reader needs to know of new topics.
+
+        That stands outside of the chunks too: with the chunk that holds it a reader would lose all messages.
+        """
+        mcap = self._mcap
+        for channel in mcap.channels[self._announced :]:
+            write_schema(mcap.bio, next(schema for schema in mcap.schemas if schema.name == channel.schema))
+            write_channel(mcap.bio, channel, mcap.schemas)
+        self._announced = len(mcap.channels)
+        if mcap.chunk.msgs:
+            mcap.close_chunk()
+        mcap.bio.flush()
 
     @property
     def _mcap(self) -> McapWriter:

@@ -7,11 +7,17 @@ import math
 import shlex
 import sys
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.foundation.text_table import aligned
+
+if TYPE_CHECKING:
+    from limb_nodes.analysis.record import MovementBag
+    from limb_nodes.solve.whole import Movement
 
 
 def add_parser(subparsers: Any) -> None:
@@ -48,24 +54,14 @@ def run(args: argparse.Namespace) -> int:
         refuse_existing(Path(args.out))
     activation = load_activation(args.source, limb.muscle_names, args.rate, args.duration)
 
+    from limb_nodes.solve.failure import SolveError
     from limb_nodes.solve.whole import TOLERANCE, WholeModel
 
+    tolerance = args.tolerance or TOLERANCE
     model = WholeModel(limb, once=True)
-    begun = time.perf_counter()
-    movement = model.simulate(
-        activation.values, args.rate, tolerance=args.tolerance or TOLERANCE, observe=bool(args.out)
-    )
-    seconds = time.perf_counter() - begun
-    for note in activation.notes:
-        print(f"note       {note}")
-    print(f"solved     {activation.duration:g} s in {seconds:.3g} s, {movement.steps[0]} steps")
-    rows = [("joint", "lowest", "highest", "at the end", "degrees")]
-    for index, joint in enumerate(limb.joint_names):
-        angle = [math.degrees(value) for value in movement.angle[:, index]]
-        rows.append((joint, f"{min(angle):.3f}", f"{max(angle):.3f}", f"{angle[-1]:.4f}", ""))
-    print("\n".join(aligned(rows, "lrrr")))
+    bag: MovementBag | nullcontext[None] = nullcontext()
     if args.out:
-        from limb_nodes.analysis.record import write_movement
+        from limb_nodes.analysis.record import MovementBag
         from limb_nodes.bags.versions import versions
 
         info = {
@@ -74,10 +70,60 @@ def run(args: argparse.Namespace) -> int:
             "laws": user_sources(limb),
             "command": shlex.join(["limb", *sys.argv[1:]]),
             "rate": args.rate,
-            "parameters": {"simulate": {"activation": args.source, "tolerance": args.tolerance or TOLERANCE}},
+            "period_ns": round(1e9 / args.rate),
+            "parameters": {"simulate": {"activation": args.source, "tolerance": tolerance}},
             "versions": versions(),
             "seed": None,
         }
-        write_movement(args.out, model, movement, args.rate, info)
+        bag = MovementBag(args.out, limb, len(activation), args.rate, info)
+    summary, failure = Summary(limb.joint_names), None
+    try:
+        with bag as recording:
+            for part in summary.over(
+                model.simulate_in_parts(activation, args.rate, tolerance=tolerance, observe=bool(args.out))
+            ):
+                if recording is not None:
+                    recording.write(part)
+    except SolveError as error:
+        # What was solved until then is in the bag, and told.
+        failure = error
+    for note in activation.notes:
+        print(f"note       {note}")
+    print("\n".join(summary.lines()))
+    if args.out:
         print(f"bag        {args.out}")
+    if failure is not None:
+        raise failure
     return 0
+
+
+class Summary:
+    """What is told of a movement: how long it took to solve, and where its joints went."""
+
+    def __init__(self, joints: Sequence[str]) -> None:
+        self._joints = joints
+        self._seconds = self._end = 0.0
+        self._steps = 0
+        self._lowest = [math.inf] * len(joints)
+        self._highest = [-math.inf] * len(joints)
+        self._last = [math.nan] * len(joints)
+
+    def over(self, parts: Iterator[Movement]) -> Iterator[Movement]:
+        """The parts of a movement, looked at."""
+        begun = time.perf_counter()
+        for part in parts:
+            self._seconds += time.perf_counter() - begun
+            self._end, self._steps = float(part.time[-1]), part.steps[0]
+            self._lowest = [min(pair) for pair in zip(self._lowest, part.angle.min(axis=0).tolist(), strict=True)]
+            self._highest = [max(pair) for pair in zip(self._highest, part.angle.max(axis=0).tolist(), strict=True)]
+            self._last = part.angle[-1].tolist()
+            yield part
+            begun = time.perf_counter()
+
+    def lines(self) -> list[str]:
+        """The lines for a person."""
+        rows = [("joint", "lowest", "highest", "at the end", "degrees")]
+        for joint, *angles in zip(self._joints, self._lowest, self._highest, self._last, strict=True):
+            lowest, highest, last = map(math.degrees, angles)
+            rows.append((joint, f"{lowest:.3f}", f"{highest:.3f}", f"{last:.4f}", ""))
+        return [f"solved     {self._end:g} s in {self._seconds:.3g} s, {self._steps} steps", *aligned(rows, "lrrr")]

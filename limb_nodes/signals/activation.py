@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,19 @@ from limb_nodes.signals.clock import fit_clock
 from limb_nodes.signals.named_values import is_bag, read_named_values
 from limb_nodes.signals.table import check_times, is_value, read_table
 from limb_nodes.signals.text_options import TextOptions
-from limb_nodes.signals.waveform import Waveform, parse_constants, read_waveforms, sample_waveforms
+from limb_nodes.signals.waveform import (
+    Waveform,
+    check_frequencies,
+    parse_constants,
+    read_waveforms,
+    sample_waveforms,
+)
 
 # A recorded run holds what drove its muscles on the first topic, a recording of EMG on the second.
 ACTIVATION_TOPICS = ("activation", "emg_envelope")
 MOST_TICKS = 10**8
+# Waveforms are looked through in stretches of so many ticks.
+STRETCH = 2**16
 # Filters and conversions of units leave values outside [0, 1] by as much as this.
 ROUNDING = 1e-6
 # An envelope that exceeds its maximum seldom exceeds it twice; one in percent does.
@@ -32,21 +41,34 @@ DURATION = Parameter("duration", "s", "simulated time", above=0.0)
 
 @dataclass(frozen=True)
 class Activation:
-    """Activations at every tick.
+    """Activations at every tick: a stretch of them, `activation[start:end]`, or all, `values`.
 
-    values: [ticks, muscles], 0 to 1, at the times k / rate, k = 0, 1, ... rate: Hz. names: the muscles,
-    one per column. notes: what a person should know about the source, one sentence each.
+    ticks: how many, at the times k / rate, k = 0, 1, ... rate: Hz. names: the muscles, one per column. between: the
+    activations [ticks, muscles], 0 to 1, from one tick to before another. notes: what a person should know about the
+    source, one sentence each.
     """
 
-    values: FloatArray
+    ticks: int
     rate: float
     names: tuple[str, ...]
+    between: Callable[[int, int], FloatArray]
     notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return self.ticks
+
+    def __getitem__(self, rows: slice) -> FloatArray:
+        return self.between(*rows.indices(self.ticks)[:2])
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """All of them, [ticks, muscles]."""
+        return self[:]
 
     @property
     def duration(self) -> float:
         """Time of the last tick (s)."""
-        return (len(self.values) - 1) / self.rate
+        return (self.ticks - 1) / self.rate
 
 
 @dataclass(frozen=True)
@@ -126,9 +148,15 @@ def _from_waveforms(
     if duration is None:
         raise FieldError("duration", f"is missing; {DURATION.allowed()} is needed, for a waveform has no end", source)
     _check_muscles(source, "muscle", tuple(waveforms), muscles)
-    times = np.arange(_ticks(duration, rate) + 1) / rate
-    values = sample_waveforms(source, waveforms, muscles, times)
-    return Activation(values, rate, tuple(muscles), _unused(tuple(waveforms), muscles))
+    count = _ticks(duration, rate) + 1
+    check_frequencies(source, waveforms, muscles, rate)
+
+    def between(start: int, end: int) -> FloatArray:
+        return sample_waveforms(source, waveforms, muscles, np.arange(start, end) / rate)
+
+    for start in range(0, count, STRETCH):
+        between(start, min(count, start + STRETCH))
+    return Activation(count, rate, tuple(muscles), between, _unused(tuple(waveforms), muscles))
 
 
 def _from_samples(samples: _Samples, muscles: Sequence[str], rate: float, duration: float | None) -> Activation:
@@ -146,12 +174,16 @@ def _from_samples(samples: _Samples, muscles: Sequence[str], rate: float, durati
         raise UserError(f"{source}: lasts {end:g} s; one tick of {1 / rate:g} s (rate {rate:g} Hz) or more is needed")
     if last > end * rate + 1e-6:
         raise FieldError("duration", f"is {duration:g}; a number <= {end:g} in s is needed, for it ends there", source)
-    ticks = np.arange(last + 1) / rate
-    if len(times) > last and np.abs(times[: last + 1] - ticks).max() < 1e-9:
-        sampled = values[: last + 1].copy()
-    else:
-        sampled = np.stack([np.interp(ticks, times, values[:, i]) for i in range(len(muscles))], axis=1)
-    return Activation(sampled, rate, tuple(muscles), samples.notes + rounded + _unused(samples.names, muscles))
+    as_they_are = len(times) > last and np.abs(times[: last + 1] - np.arange(last + 1) / rate).max() < 1e-9
+
+    def between(start: int, end: int) -> FloatArray:
+        if as_they_are:
+            return values[start:end].copy()
+        ticks = np.arange(start, end) / rate
+        return np.stack([np.interp(ticks, times, values[:, i]) for i in range(len(muscles))], axis=1)
+
+    notes = samples.notes + rounded + _unused(samples.names, muscles)
+    return Activation(last + 1, rate, tuple(muscles), between, notes)
 
 
 def _checked(samples: _Samples, values: FloatArray, muscles: Sequence[str]) -> tuple[FloatArray, tuple[str, ...]]:

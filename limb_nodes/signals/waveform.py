@@ -154,25 +154,27 @@ def parse_constants(text: str) -> dict[str, Waveform]:
     return waveforms
 
 
-def sample_waveforms(
-    source: str, waveforms: Mapping[str, Waveform], muscles: Sequence[str], times: FloatArray
-) -> FloatArray:
-    """Activations [samples, muscles] at evenly spaced times [samples] in s.
-
-    Raises UserError if a waveform leaves [0, 1] without being clipped, or oscillates faster than
-    the samples can follow.
-    """
-    rate = (len(times) - 1) / times[-1]
-    columns = []
+def check_frequencies(source: str, waveforms: Mapping[str, Waveform], muscles: Sequence[str], rate: float) -> None:
+    """Raise UserError if a waveform oscillates faster than samples at a rate (Hz) can follow."""
     for muscle in muscles:
-        waveform = waveforms[muscle]
-        frequency = waveform.numbers.get("frequency", 0.0)
+        frequency = waveforms[muscle].numbers.get("frequency", 0.0)
         if frequency >= rate / 2:
             raise UserError(
                 f"{source}: muscles.{muscle}.frequency is {frequency:g}; "
                 f"a number < {rate / 2:g} in Hz is needed, half the rate"
             )
-        values = waveform.sample(times)
+
+
+def sample_waveforms(
+    source: str, waveforms: Mapping[str, Waveform], muscles: Sequence[str], times: FloatArray
+) -> FloatArray:
+    """Activations [samples, muscles] at times [samples] in s.
+
+    Raises UserError if a waveform leaves [0, 1] without being clipped.
+    """
+    columns = []
+    for muscle in muscles:
+        values = waveforms[muscle].sample(times)
         outside = np.flatnonzero((values < 0.0) | (values > 1.0))
         if outside.size:
             first = outside[0]

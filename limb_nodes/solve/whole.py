@@ -247,7 +247,8 @@ class WholeModel:
             states = course.advance(stretch, pause)
             given = excitation[done : done + len(states)]
             done += len(states)
-            yield self._movement(stretch, states, given, seen if observe else (), course.steps)
+            if len(states):
+                yield self._movement(stretch, states, given, seen if observe else (), course.steps)
         if course.failure is not None:
             raise course.failure
 

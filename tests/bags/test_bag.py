@@ -271,17 +271,3 @@ def test_damage_in_the_middle_is_told_in_one_line(where: float, tmp_path: Path) 
 def test_a_message_with_a_field_that_the_type_lacks_is_refused() -> None:
     with pytest.raises(TypeError, match="has no field angel"):
         make_message(TOPIC_TYPES["movement_pattern"], angel=[0.0])
-
-
-def test_a_full_disk_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    bag = BagWriter(tmp_path / "run", INFO)
-    monkeypatch.setattr(bag._writer, "write_all", full)
-    message = make_message(TOPIC_TYPES["activation"], 0)
-    with pytest.raises(UserError, match="No space left"):
-        for k in range(100_000):
-            bag.write("activation", k, message)
-    with pytest.raises(UserError, match="No space left"):
-        bag.close()

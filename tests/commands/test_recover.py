@@ -16,7 +16,7 @@ from limb_nodes.foundation.topics import TOPIC_TYPES
 
 @pytest.fixture
 def whole(tmp_path: Path) -> Path:
-    with BagWriter(tmp_path / "whole", {"seed": 1}, flush_period=0.0, compressed=False) as bag:
+    with BagWriter(tmp_path / "whole", {"seed": 1}, compressed=False) as bag:
         for k in range(500):
             message = make_message(TOPIC_TYPES["activation"], k, tick=k, name=["a"], activation=[0.5])
             bag.write("activation", k * 1_000_000, message)

@@ -13,12 +13,18 @@ from limb_nodes.solve.whole import WholeModel
 
 LIMBS = ["reference_joint", "reference_joint_tendon", "seated_knee", "arm", "pennate_leg"]
 LAW = """
-from limb_nodes.levels import law
+import math
 
-@law("force_length", source="a law that breaks off")
+from limb_nodes.levels import Law, equation
+
+
+@equation("broken", "force_length_factor")
 def broken(fibre_length_norm: float) -> float:
     \"\"\"Force-length factor (1).\"\"\"
-    return 1.0 if fibre_length_norm > {edge} else math.nan
+    return math.nan if {edge} < fibre_length_norm < {edge} + 0.05 else 1.0 - (fibre_length_norm - 1.0) ** 2
+
+
+breaks_off = Law("force_length", "breaks_off", (broken,), ranges={{"fibre_length_norm": (0.9, 1.2)}})
 """
 
 
@@ -73,11 +79,27 @@ def test_a_long_input_takes_its_drives_from_the_table_in_every_part(model_named,
 
 
 def broken_limb(folder: Path, edge: float) -> WholeModel:
-    """The reference joint with a law that gives NaN for fibres shorter than an edge."""
+    """The reference joint with a law that gives NaN for fibres about as long as an edge."""
     text = Path("params/reference_joint.yaml").read_text()
     head, _, tail = text.partition("    force_length:\n")
-    (folder / "breaks_off.py").write_text("import math\n" + LAW.format(edge=edge))
+    (folder / "breaks_off.py").write_text(LAW.format(edge=edge))
     lines = tail.splitlines(keepends=True)
     kept = next(i for i, line in enumerate(lines) if not line.startswith("      "))
-    (folder / "limb.yaml").write_text(f"{head}    force_length:\n      law: breaks_off:broken\n{''.join(lines[kept:])}")
+    (folder / "limb.yaml").write_text(f"{head}    force_length:\n      law: breaks_off:breaks_off\n{''.join(lines[kept:])}")
     return WholeModel(load_limb(folder / "limb.yaml"))
+
+
+@pytest.mark.parametrize("method", ["explicit", "implicit"])
+def test_a_law_that_breaks_off_is_named_with_time_and_place(method, tmp_path):
+    model = broken_limb(tmp_path, 1.24)
+    excitation = np.tile([0.9, 0.0], (2001, 1))
+    parts = []
+    with pytest.raises(SolveError) as caught:
+        parts.extend(model.simulate_in_parts(excitation, 1000.0, method=method))
+    line = str(caught.value)
+    assert "a rate is not a finite number: muscle flexor, unit unit, law breaks_off:breaks_off of force_length" in line
+    assert "force_length_factor is nan at fibre_length_norm 1.24" in line
+    assert 0.0 < parts[-1].time[-1] < 1.0
+    np.testing.assert_array_less(parts[-1].unit["fibre_length_norm"][:, 0], 1.24)
+    with pytest.raises(SolveError, match=r"stops at 0\.\d+ s"):
+        model.simulate(excitation, 1000.0, method=method)
