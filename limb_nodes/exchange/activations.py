@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from limb_nodes.exchange.part import Part
+from limb_nodes.exchange.past import Past
 from limb_nodes.foundation.arrays import FloatArray
 
 # How long before the last tick a run that is stopped tells which it is (s).
@@ -52,6 +53,10 @@ class ActivationPart(Part):
             self.activation.values["activation"][:] = self.values_at(following)
             self.activation.publish(following)
         self.sent = max(self.sent, last)
+
+    def go_on_after(self, past: Past) -> None:
+        """Send what follows the last tick."""
+        self.now = self.sent = past.tick
 
     @property
     def done(self) -> int:

@@ -16,6 +16,7 @@ from limb_nodes.bags.types import limb_typestore, make_message
 from limb_nodes.exchange.identity import LENGTH, TEXT
 from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.model import Limb
+from limb_nodes.model.layout import build_layout
 from limb_nodes.model.points import point_names
 from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, UNIT_FIELDS
 from limb_nodes.solve.small import finite, within_unit
@@ -81,7 +82,7 @@ def forms_of(limb: Limb) -> dict[str, Form]:
         "muscle": [muscle.name for muscle in limb.muscles for _ in muscle.units],
         "unit": [unit.name for muscle in limb.muscles for unit in muscle.units],
     }
-    units = len(of_unit["unit"])
+    units, layout = len(of_unit["unit"]), build_layout(limb)
     corner = make_message("geometry_msgs/msg/Point")
     fields: dict[str, dict[str, Any]] = {
         "activation": {"name": muscles, **zeros(["activation"], len(muscles))},
@@ -99,6 +100,8 @@ def forms_of(limb: Limb) -> dict[str, Form]:
         "muscle_state": {"name": muscles, **zeros(MUSCLE_FIELDS, len(muscles))},
         "motor_unit_state": {**of_unit, **zeros(UNIT_FIELDS, units)},
         "sarcomere_state": {**of_unit, **zeros(SARCOMERE_FIELDS, units)},
+        "muscle_checkpoint": {"state": [0.0] * (layout.states + 2 * layout.joints + 2 * layout.drives + 1)},
+        "limb_checkpoint": {"state": [0.0] * (4 * layout.joints + 4)},
     }
     return {topic: Form(topic, names, share=topic == "activation") for topic, names in fields.items()}
 

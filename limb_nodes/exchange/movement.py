@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from limb_nodes.exchange.part import Part
-from limb_nodes.exchange.stream import RECORDER_LAG
+from limb_nodes.exchange.past import Past
+from limb_nodes.exchange.stream import CHECKPOINT, RECORDER_LAG
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.points import points
 from limb_nodes.solve.stepping import LimbStepper
@@ -46,6 +47,7 @@ class LimbPart(Part):
         self.started_at: float | None = None
         self.last_tick = -1
         self.joint_states, self.pattern = self.sends("joint_states"), self.sends("movement_pattern")
+        self.checkpoint = self.sends("limb_checkpoint")
         self.takes("joint_torque", self.on_torque, gaps=self.realtime)
 
     def begin(self) -> None:
@@ -59,6 +61,8 @@ class LimbPart(Part):
         values = self.joint_states.values
         values["position"][:], values["velocity"][:] = self.stepper.angle, self.stepper.velocity
         self.joint_states.publish(self.tick)
+        if self.tick % CHECKPOINT == 0:
+            self.send_checkpoint()
 
     def on_recorded(self, tick: int) -> None:
         """The recorder has every tick up to this one; -1 when it is ready."""
@@ -77,7 +81,7 @@ class LimbPart(Part):
         if tick > self.tick:
             self.refuse(f"joint_torque: a message is of tick {tick}, which has not been; the limb is at {self.tick}")
             return
-        rows = np.array([self.values("joint_torque", data, name) for name in TORQUE_FIELDS])
+        rows = self.rows(data)
         self.last_tick = self.forms["joint_torque"].number(data, "last_tick")
         if self.realtime:
             self.newest = tick, rows
@@ -87,6 +91,10 @@ class LimbPart(Part):
             self.pending = rows
         elif not self.finished:
             self.step(rows)
+
+    def rows(self, data: bytes) -> FloatArray:
+        """Torque and slopes [4, n] of a message."""
+        return np.array([self.values("joint_torque", data, name) for name in TORQUE_FIELDS])
 
     def step_to_now(self) -> None:
         """In real time, step as far as the wall clock has gone."""
@@ -160,6 +168,21 @@ class LimbPart(Part):
         self.stepper.step(rows, self.ticks.period)
         self.tick += 1
         self.offer()
+
+    def send_checkpoint(self) -> None:
+        """Send all that the following ticks depend on."""
+        self.checkpoint.values["state"][:] = self.stepper.remembered
+        self.checkpoint.publish(self.tick)
+
+    def go_on_after(self, past: Past) -> None:
+        """Step from the newest checkpoint, or from the start, under the torques."""
+        if past.limb is not None:
+            self.tick, data = past.limb
+            self.stepper.remember(self.values("limb_checkpoint", data, "state"))
+        for tick in range(self.tick, past.tick + 1):
+            self.stepper.step(self.rows(past.messages["joint_torque"][tick]), self.ticks.period)
+        self.tick = past.tick + 1
+        self.recorded = past.tick
 
     def before_the_end(self) -> None:
         """What is to be said before the message with which the recording ends."""

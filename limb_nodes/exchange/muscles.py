@@ -9,6 +9,8 @@ import numpy as np
 from limb_nodes.errors import RunError
 from limb_nodes.exchange.outgoing import Outgoing
 from limb_nodes.exchange.part import Part
+from limb_nodes.exchange.past import Past
+from limb_nodes.exchange.stream import CHECKPOINT
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.topics import STATES
 from limb_nodes.solve.outputs import MUSCLE_FIELDS, MUSCLE_OUTPUTS, SARCOMERE_FIELDS, UNIT_FIELDS, UNIT_OUTPUTS
@@ -36,7 +38,7 @@ class MusclePart(Part):
         self.excitation: FloatArray = np.zeros(muscles)
         self.inputs: dict[int, Input] = {}
         self.waiting: tuple[int, FloatArray, FloatArray] | None = None
-        self.torque = self.sends("joint_torque")
+        self.torque, self.checkpoint = self.sends("joint_torque"), self.sends("muscle_checkpoint")
         self.states = [self.copied(topic) for topic in states]
         self.takes("activation", self.on_activation, gaps=self.realtime)
         self.takes("joint_states", self.on_joint_states, gaps=self.realtime)
@@ -53,21 +55,27 @@ class MusclePart(Part):
         return messages, [(messages.values[field], shown[:, outputs.index(name)]) for field, name in fields.items()]
 
     def on_activation(self, tick: int, data: bytes) -> None:
+        """Keep the activation of a tick, and answer if it was waited for."""
+        self.keep_activation(tick, data)
+        self.answer()
+
+    def keep_activation(self, tick: int, data: bytes) -> None:
         """Keep the activation of a tick."""
         self.last_tick = self.forms["activation"].number(data, "last_tick")
         values = self.values("activation", data, "activation").astype(np.float64)
         self.excitation = values
         self.inputs[tick] = values, self.stepper.drive(values)
-        self.answer()
+
+    def joint_state(self, data: bytes) -> tuple[FloatArray, FloatArray]:
+        """Angles and velocities of a message."""
+        angle, velocity = (self.values("joint_states", data, name) for name in ("position", "velocity"))
+        return angle.astype(np.float64), velocity.astype(np.float64)
 
     def on_joint_states(self, tick: int, data: bytes) -> None:
         """Keep the joint states; in real time the ones before are answered first, with what is there."""
-        angle, velocity = (
-            self.values("joint_states", data, name).astype(np.float64) for name in ("position", "velocity")
-        )
         if self.waiting is not None and self.realtime:
             self.send(None)
-        self.waiting = tick, angle, velocity
+        self.waiting = tick, *self.joint_state(data)
         self.answer()
 
     def answer(self) -> None:
@@ -102,6 +110,8 @@ class MusclePart(Part):
         values["slope_velocity"][:], values["slope_time"][:] = rows[2], rows[3]
         values["last_tick"][...] = self.last_tick
         self.torque.publish(tick)
+        if tick % CHECKPOINT == 0:
+            self.send_checkpoint()
         self.finished = 0 <= self.last_tick <= tick
         for old in [key for key in self.inputs if key < tick]:
             del self.inputs[old]
@@ -116,6 +126,28 @@ class MusclePart(Part):
         self.last_drive = self.drive if tick == self.tick + 1 and self.tick >= 0 else None
         self.tick, self.angle, self.velocity, self.drive = tick, angle, velocity, drive
         return excitation, drive
+
+    def send_checkpoint(self) -> None:
+        """Send all that the following ticks depend on."""
+        has_last = self.last_drive is not None
+        last_drive = self.last_drive if self.last_drive is not None else np.zeros_like(self.drive)
+        parts = self.stepper.internal, self.angle, self.velocity, self.drive, last_drive, [float(has_last)]
+        self.checkpoint.values["state"][:] = np.concatenate(parts)
+        self.checkpoint.publish(self.tick)
+
+    def go_on_after(self, past: Past) -> None:
+        """Advance from the newest checkpoint, or from the start, along the joint states."""
+        if past.muscles is not None:
+            self.tick, data = past.muscles
+            state = self.values("muscle_checkpoint", data, "state").astype(np.float64)
+            sizes = [self.stepper.internal.size, self.angle.size, self.velocity.size, self.drive.size, self.drive.size]
+            internal, self.angle, self.velocity, self.drive, last_drive, has_last = np.split(state, np.cumsum(sizes))
+            self.stepper.internal[:] = internal
+            self.last_drive = last_drive if has_last[0] else None
+        for tick in range(self.tick + 1, past.tick + 1):
+            self.keep_activation(tick, past.messages["activation"][tick])
+            self.advance(tick, *self.joint_state(past.messages["joint_states"][tick]))
+            del self.inputs[tick]
 
     @property
     def done(self) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 from limb_nodes.exchange.forms import Form, forms_of
 from limb_nodes.exchange.identity import FRAME, frame_of, identity_of
 from limb_nodes.exchange.outgoing import Outgoing
+from limb_nodes.exchange.past import Past
 from limb_nodes.exchange.stream import Conflict, Stream
 from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.model import Limb
@@ -88,6 +89,16 @@ class Part:
         """Count a message of the run that cannot be used, and say so."""
         self.bad_input += 1
         self.complain(what)
+
+    def take_up(self, past: Past) -> None:
+        """Go on behind the last tick of what has been recorded; before the part receives anything."""
+        for stream in self.streams.values():
+            stream.go_on_after(past.tick)
+        self.go_on_after(past)
+
+    def go_on_after(self, past: Past) -> None:
+        """Become what the part was after the last tick of what has been recorded."""
+        raise NotImplementedError
 
     @property
     def done(self) -> int:

@@ -10,6 +10,9 @@ from limb_nodes.exchange.outgoing import stamp_of
 RECORDER_LAG = 256
 HISTORY = 2 * RECORDER_LAG
 
+# Every so many ticks the nodes send all that they have to remember.
+CHECKPOINT = RECORDER_LAG // 2
+
 Message = tuple[int, bytes]
 
 
@@ -56,6 +59,10 @@ class Stream:
             if before[0] == tick - self.every:
                 return self._take(before, (tick, data))
         raise ValueError(f"is of tick {tick}; that of tick {self.next} is needed next")
+
+    def go_on_after(self, tick: int) -> None:
+        """Take next what follows a tick."""
+        self.next = tick + self.every - tick % self.every
 
     def _take(self, *messages: Message) -> tuple[Message, ...]:
         for message in messages:

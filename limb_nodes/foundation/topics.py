@@ -14,6 +14,8 @@ TOPIC_TYPES: dict[str, str] = {
     "muscle_state": "limb_msgs/msg/MuscleState",
     "motor_unit_state": "limb_msgs/msg/MotorUnitState",
     "sarcomere_state": "limb_msgs/msg/SarcomereState",
+    "muscle_checkpoint": "limb_msgs/msg/Checkpoint",
+    "limb_checkpoint": "limb_msgs/msg/Checkpoint",
     "external_load": "geometry_msgs/msg/WrenchStamped",
     "run_info": "std_msgs/msg/String",
     "robot_description": "std_msgs/msg/String",
@@ -36,5 +38,7 @@ SENDERS = {
     "joint_torque": "muscle_stack",
     "movement_pattern": "limb_dynamics",
     **dict.fromkeys(STATES, "muscle_stack"),
+    "muscle_checkpoint": "muscle_stack",
+    "limb_checkpoint": "limb_dynamics",
 }
-"""Topic with a message for each tick -> the node that sends it."""
+"""Topic of a run, with a message for each tick or for every so many -> the node that sends it."""

@@ -239,6 +239,23 @@ class LimbStepper:
         load: FloatArray = self._data.load
         return load
 
+    @property
+    def remembered(self) -> FloatArray:
+        """All that the next steps depend on [4 n + 4]; `remember` takes it.
+
+        Joint states, the torque that is expected, which joints are locked, the load, and whether a torque is expected.
+        """
+        expects = self._predicted.size > 0
+        expected = self._predicted if expects else np.zeros(self.joints)
+        return np.concatenate([self._state, expected, self._data.locked, self.load, [float(expects)]])
+
+    def remember(self, values: FloatArray) -> None:
+        """Go on from what another stepper of the same limb remembered."""
+        n = self.joints
+        self._state[:], self._expected[:] = values[: 2 * n], values[2 * n : 3 * n]
+        self._data.locked[:], self.load[:] = values[3 * n : 4 * n], values[4 * n : 4 * n + 3]
+        self._predicted = self._expected if values[-1] else NO_TIMES
+
     def acceleration(self, torque: FloatArray) -> FloatArray:
         """Joint accelerations [n] (rad/s^2) at the current tick under rows of torque [4, n]."""
         data, model = self._data, self.model

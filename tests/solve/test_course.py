@@ -85,7 +85,9 @@ def broken_limb(folder: Path, edge: float) -> WholeModel:
     (folder / "breaks_off.py").write_text(LAW.format(edge=edge))
     lines = tail.splitlines(keepends=True)
     kept = next(i for i, line in enumerate(lines) if not line.startswith("      "))
-    (folder / "limb.yaml").write_text(f"{head}    force_length:\n      law: breaks_off:breaks_off\n{''.join(lines[kept:])}")
+    (folder / "limb.yaml").write_text(
+        f"{head}    force_length:\n      law: breaks_off:breaks_off\n{''.join(lines[kept:])}"
+    )
     return WholeModel(load_limb(folder / "limb.yaml"))
 
 

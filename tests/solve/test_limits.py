@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from limb_nodes.solve.failure import SolveError
 from limb_nodes.solve.limits import crossing
 from limb_nodes.solve.pieces import pieces
-from limb_nodes.solve.failure import SolveError
 
 RATE = 1000.0
 

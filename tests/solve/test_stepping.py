@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from limb_nodes.solve.stepping import LimbStepper, MuscleStepper
 from limb_nodes.solve.failure import SolveError
+from limb_nodes.solve.stepping import LimbStepper, MuscleStepper
 
 
 def run(limb, excitation: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray, MuscleStepper]:

@@ -1,0 +1,70 @@
+"""What has been recorded of a run, as far as its nodes need it to go on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from limb_nodes.exchange.outgoing import stamp_of
+
+# What the ticks behind a checkpoint are made from.
+NEEDED = ("activation", "joint_states", "joint_torque")
+
+
+@dataclass
+class Past:
+    """The last ticks of a run that are recorded.
+
+    tick: the last that is there on every topic, -1 if none is. counts: topic -> messages up to it. messages: topic ->
+    tick -> message, in CDR, from the checkpoints on. muscles, limb: the newest checkpoint of muscle_stack and of
+    limb_dynamics, its tick and message; None for the start.
+    """
+
+    tick: int = -1
+    counts: dict[str, int] = field(default_factory=dict)
+    messages: dict[str, dict[int, bytes]] = field(default_factory=lambda: {topic: {} for topic in NEEDED})
+    muscles: tuple[int, bytes] | None = None
+    limb: tuple[int, bytes] | None = None
+
+
+def past_of(recorded: Iterable[tuple[str, bytes]], every: Mapping[str, int], nanoseconds: int) -> Past:
+    """The past of a run from what is recorded.
+
+    recorded: topic, without its namespace, and message, in the order of their recording; topics that are not in `every`
+    are passed over. every: topic -> every how many ticks it has a message. nanoseconds: of one tick. What is behind the
+    first gap of a topic is not used. Only so much is kept as is needed to go on.
+    """
+    past = Past(counts=dict.fromkeys(every, 0))
+    checkpoints: dict[str, list[tuple[int, bytes]]] = {"muscle_checkpoint": [], "limb_checkpoint": []}
+    for topic, data in recorded:
+        if topic not in every or (tick := stamp_of(data) // nanoseconds) != past.counts[topic] * every[topic]:
+            continue
+        past.counts[topic] += 1
+        if topic in NEEDED:
+            past.messages[topic][tick] = data
+        elif topic in checkpoints:
+            checkpoints[topic].append((tick, data))
+            drop(past, checkpoints, every)
+    past.tick = complete(past.counts, every)
+    for topic, step in every.items():
+        past.counts[topic] = past.tick // step + 1
+    newest = {name: [found for found in some if found[0] <= past.tick][-1:] for name, some in checkpoints.items()}
+    past.muscles, past.limb = (next(iter(some), None) for some in newest.values())
+    return past
+
+
+def complete(counts: Mapping[str, int], every: Mapping[str, int]) -> int:
+    """The newest tick that is there on every topic, of so many messages from tick 0 on; -1 if none is."""
+    return min(count * every[topic] for topic, count in counts.items()) - 1
+
+
+def drop(past: Past, checkpoints: dict[str, list[tuple[int, bytes]]], every: Mapping[str, int]) -> None:
+    """Drop what comes before the checkpoints from which all that is complete follows."""
+    tick = complete(past.counts, every)
+    for name, some in checkpoints.items():
+        old = [found for found in some if found[0] <= tick]
+        checkpoints[name] = [*old[-1:], *some[len(old) :]]
+    first = min(some[0][0] if some else 0 for some in checkpoints.values())
+    for messages in past.messages.values():
+        for old_tick in [tick for tick in messages if tick < first]:
+            del messages[old_tick]
