@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from threading import Event, Thread
@@ -151,6 +151,15 @@ class BagWriter:
                 self._drained = self._thread.submit(self._drain)
         elif much:
             self._drained.result()
+
+    def flush(self) -> Future[None]:
+        """Ask for all that has been handed over to be brought to the disk; done when it is there.
+
+        Raises:
+            RunError: an earlier message could not be written.
+        """
+        self._check()
+        return self._thread.submit(self._flush)
 
     def close(self) -> None:
         """Write what is waiting, the index and metadata.yaml. Safe to call again.

@@ -8,6 +8,8 @@ import shlex
 import sys
 from typing import Any
 
+from limb_nodes.errors import FieldError
+
 # Exit status of a run whose live source never came, or was silent at its end.
 INPUT_LOST = 3
 
@@ -18,9 +20,10 @@ def add_parser(subparsers: Any) -> None:
         "run",
         help="run a limb as ROS 2 nodes and record it",
         description="Run activation_input, muscle_stack, limb_dynamics and recorder until the activation ends. "
-        "Exit status 3 if a live source never came or was silent at the end.",
+        "Exit status 3 if a live source never came or was silent at the end; 1 if the run could not be finished, or if "
+        "somebody else published in its name.",
     )
-    parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
+    parser.add_argument("limb", metavar="LIMB.yaml", nargs="?", default="", help="the limb (default: that of --resume)")
     parser.add_argument(
         "--activation",
         dest="source",
@@ -34,6 +37,14 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help="folder of the bag, which must not exist")
     parser.add_argument("--mode", choices=("lockstep", "realtime"), default="lockstep", help="(default lockstep)")
     parser.add_argument("--processes", action="store_true", help="each node in a process of its own")
+    parser.add_argument(
+        "--resume", default="", metavar="BAG",
+        help="go on behind the last tick of a lockstep run that was cut short, with its settings; DIR gets all of it",
+    )  # fmt: skip
+    parser.add_argument("--respawn", action="store_true", help="start a node that was killed anew (with --processes)")
+    parser.add_argument(
+        "--stall-limit", type=float, default=None, metavar="S", help="end if no tick comes for so long (default 30)"
+    )
     parser.add_argument("--namespace", default="", metavar="NS", help="namespace of all nodes, for several limbs")
     parser.add_argument("--state-every", type=int, default=1, metavar="N", help="record states every N ticks")
     parser.add_argument("--no-states", action="store_true", help="do not record muscle, unit and sarcomere states")
@@ -70,9 +81,11 @@ def run(args: argparse.Namespace) -> int:
     """Run, show progress, print a summary."""
     from tqdm import tqdm
 
+    from limb_nodes.exchange.watch import STALL_LIMIT
     from limb_nodes.foundation.parameter import Parameter
     from limb_nodes.foundation.topics import STATES
     from limb_nodes.nodes.live_settings import LiveSettings
+    from limb_nodes.nodes.resuming import resumed
     from limb_nodes.nodes.session import run_in_one_process, run_in_processes
     from limb_nodes.nodes.settings import RunSettings, checked
 
@@ -90,6 +103,8 @@ def run(args: argparse.Namespace) -> int:
         states=() if args.no_states else STATES,
         state_every=args.state_every,
         command=shlex.join(["limb", *sys.argv[1:]]),
+        stall_limit=STALL_LIMIT if args.stall_limit is None else args.stall_limit,
+        respawn=args.respawn,
         live=LiveSettings(
             channels=",".join(args.channels),
             on_silence=args.on_silence,
@@ -101,6 +116,10 @@ def run(args: argparse.Namespace) -> int:
             low_pass=args.low_pass,
         ),
     )
+    if args.resume:
+        settings = resumed(settings, args.resume)
+    if args.respawn and not args.processes:
+        raise FieldError("respawn", "is given; --processes is needed with it, for one process is killed as a whole")
     ready, final = checked(settings)
     with tqdm(
         total=None if final is None else final + 1, unit="tick", disable=not sys.stderr.isatty(), leave=False
@@ -113,13 +132,17 @@ def run(args: argparse.Namespace) -> int:
     if outcome.interrupted and not os.path.exists(ready.out):
         print("interrupted before anything was recorded")
         return 130
-    seconds = (outcome.ticks - 1) / args.rate if outcome.ticks else 0.0
-    print(f"ticks      {outcome.ticks} at {args.rate:g} Hz ({seconds:g} s)")
+    seconds = (outcome.ticks - 1) / ready.rate if outcome.ticks else 0.0
+    print(f"ticks      {outcome.ticks} at {ready.rate:g} Hz ({seconds:g} s)")
     print(f"missing    {outcome.missing}")
-    if args.mode == "realtime":
+    if ready.mode == "realtime":
         print(f"deadlines  {outcome.missed} missed")
     if outcome.bad_input:
         print(f"bad input  {outcome.bad_input} messages kept out")
+    if outcome.foreign:
+        print(f"strangers  {outcome.foreign} messages of others kept out")
+    if outcome.conflicts:
+        print(f"doubtful   {outcome.conflicts} ticks came twice with different values: another publishes for this run")
     if outcome.live:
         print(f"live input {outcome.live}")
     print(f"wall time  {outcome.seconds:.2f} s ({seconds / max(outcome.seconds, 1e-9):.3g} simulated s per s)")
@@ -127,4 +150,6 @@ def run(args: argparse.Namespace) -> int:
     if outcome.interrupted:
         print("interrupted; the bag holds what was recorded until then")
         return 130
+    if outcome.conflicts:
+        return 1
     return INPUT_LOST if outcome.lost else 0

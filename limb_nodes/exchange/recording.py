@@ -8,12 +8,8 @@ from typing import Any
 
 from limb_nodes.exchange.outgoing import stamp_of
 from limb_nodes.exchange.part import Part
-from limb_nodes.exchange.past import Past
-from limb_nodes.exchange.stream import CHECKPOINT
+from limb_nodes.exchange.past import Past, expected_topics
 from limb_nodes.foundation.topics import SENDERS, STATES
-
-# Every how many ticks a topic has a message, if not at each.
-EVERY = {"muscle_checkpoint": CHECKPOINT, "limb_checkpoint": CHECKPOINT}
 
 
 class RecordingPart(Part):
@@ -25,19 +21,19 @@ class RecordingPart(Part):
 
     def __init__(self, *given: Any, **options: Any) -> None:
         super().__init__(*given, **options)
-        self.expected = {topic: EVERY.get(topic, 1) for topic in SENDERS if topic not in STATES}
+        self.expected = {topic: every for topic, every in expected_topics({}).items() if topic not in STATES}
         self.counts = dict.fromkeys(SENDERS, 0)
         self.last_tick = -1
         self._new: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in SENDERS}
         for topic in SENDERS:
             self.takes(topic, partial(self.on_message, topic), gaps=True)
-            self.streams[topic].every = EVERY.get(topic, 1)
+            self.streams[topic].every = self.expected.get(topic, 1)
 
     def expect_states(self, parameters: Mapping[str, Any]) -> None:
         """Expect the states that muscle_stack sends with these parameters."""
-        for topic in STATES:
-            if parameters.get(f"publish_{topic}", True):
-                self.streams[topic].every = self.expected[topic] = int(parameters.get("state_every", 1))
+        self.expected = expected_topics(parameters)
+        for topic, every in self.expected.items():
+            self.streams[topic].every = every
 
     def go_on_after(self, past: Past) -> None:
         """Count what has been recorded as taken."""

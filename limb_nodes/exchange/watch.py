@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from limb_nodes.foundation.parameter import Parameter
+
+STALL = Parameter("stall_limit", "s", "how long a run may wait for a tick", minimum=1.0, maximum=1e9)
+STALL_LIMIT = 30.0
 # What is waited for is said after so long (s), and again each time that it has taken twice as long.
 SOON = 1.0
 # The longest time between two looks that counts (s): whoever stands still himself has not waited.
@@ -12,9 +16,9 @@ LOOK_PERIOD = 0.25
 class Watch:
     """Looks at what goes on. waited: how long nothing has (s)."""
 
-    def __init__(self, limit: float, start: float) -> None:
-        """limit: of waiting (s), after the first tick. start: how long the first tick may take unsaid (s)."""
-        self._limit, self._start = limit, start
+    def __init__(self, limit: float, start: float, soon: float = SOON) -> None:
+        """limit: of waiting, after the first tick. start, soon: how long the first and others may take unsaid (s)."""
+        self._limit, self._start, self._soon = limit, start, soon
         self.waited = 0.0
         self._say_at = start
         self._done: int | None = None
@@ -29,7 +33,7 @@ class Watch:
         passed = 0.0 if self._looked is None else min(now - self._looked, LONGEST_LOOK)
         self._looked = now
         if done != self._done or not awaited:
-            self._done, self.waited, self._say_at = done, 0.0, SOON if done > 0 else self._start
+            self._done, self.waited, self._say_at = done, 0.0, self._soon if done > 0 else self._start
             return ""
         self.waited += passed
         if self.waited < self._say_at:

@@ -19,8 +19,9 @@ from std_msgs.msg import Header
 from limb_nodes.errors import RunError, UserError
 from limb_nodes.exchange.identity import FORM, is_identity
 from limb_nodes.exchange.part import Part
+from limb_nodes.exchange.past import RecordedRun
 from limb_nodes.exchange.ticks import Ticks
-from limb_nodes.exchange.watch import LOOK_PERIOD, Watch
+from limb_nodes.exchange.watch import LOOK_PERIOD, STALL, STALL_LIMIT, Watch
 from limb_nodes.model import Limb, load_limb
 from limb_nodes.nodes.distribution import given_parameters
 from limb_nodes.nodes.messages import class_of
@@ -59,7 +60,9 @@ class LimbNode(Node):
         )
         if self.given_identity and not is_identity(self.given_identity):
             raise UserError(f"{name}: the parameter identity is {self.given_identity!r}; {FORM} are needed")
-        limit = self.number("stall_limit", 30.0, "end the run if no tick has come for so long, s", 1.0, 1e9)
+        self.resume = self.text("resume", "", "bag of the run that this node goes on with; empty: a new run")
+        meaning = "end the run if no tick has come for so long, s"
+        limit = self.number("stall_limit", STALL_LIMIT, meaning, STALL.minimum or 0.0, STALL.maximum or 0.0)
         self.watch = Watch(limit, math.inf if PARENT in os.environ else UNSAID)
 
     @property
@@ -77,6 +80,8 @@ class LimbNode(Node):
         """Publish what a part sends, and watch over it; listen: hand it what it takes, too."""
         self.part = part
         part.complain = self.complain
+        if self.resume:
+            part.take_up(self.recorded_run().past())
         for topic, messages in part.outgoing.items():
             messages.send = self.create_publisher(class_of(topic), topic, STREAM).publish
         for topic in part.streams if listen else ():
@@ -86,6 +91,17 @@ class LimbNode(Node):
 
             self.listen(class_of(topic), topic, receive, STREAM, raw=True)
         self.create_timer(LOOK_PERIOD, self.on_look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def recorded_run(self) -> RecordedRun:
+        """The run that the node goes on with. Raises UserError if it is of another limb or rate."""
+        run = RecordedRun.read(self.resume)
+        for key, own in ("limb", self.limb.text), ("period_ns", self.ticks.nanoseconds):
+            if run.info[key] != own:
+                raise UserError(
+                    f"{self.get_name()}: the parameter resume is {self.resume}, whose {key} is another than that of "
+                    "this node; the bag of this run is needed"
+                )
+        return run
 
     def on_look(self) -> None:
         """Say what the part waits for if nothing goes on, and give up at last."""

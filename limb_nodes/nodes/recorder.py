@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import shutil
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,6 +28,7 @@ from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
 from limb_nodes.exchange.identity import is_identity
 from limb_nodes.exchange.recording import RecordingPart
+from limb_nodes.exchange.stream import RECORDER_LAG
 from limb_nodes.foundation.topics import LATCHED_TOPICS, NODES, SENDERS, TOPIC_TYPES
 from limb_nodes.model import user_sources
 from limb_nodes.nodes.base import LimbNode
@@ -40,6 +43,8 @@ SOURCES = {"emg": Float64MultiArray, "emg_envelope": MuscleActivation}
 OTHERS = {**SOURCES, "external_load": WrenchStamped, "/diagnostics": DiagnosticArray}
 # How often the topics are emptied (s). An executor would take three times as long for each message.
 POLL_PERIOD = 0.005
+# So many ticks at least are brought to the disk at once.
+FLUSHED = RECORDER_LAG // 4
 # How long to wait for the other nodes to tell their parameters once messages flow (s).
 PATIENCE = 5.0
 # How long to wait for a node's answer before it is asked again (s).
@@ -50,7 +55,7 @@ class Recorder(LimbNode):
     """Subscribes every topic and writes each tick once.
 
     Publishes `recorder_progress`, the identity of the run and a time: of tick -1 when it is ready, then of the newest
-    tick that it has on every topic. Finished when the last tick of the run is in the bag on every topic.
+    tick that is on the disk on every topic. Finished when the last tick of the run is in the bag on every topic.
     """
 
     part: RecordingPart
@@ -59,6 +64,7 @@ class Recorder(LimbNode):
         super().__init__("recorder", **options)
         out = self.text("out", "", "folder of the bag, which must not exist")
         self.command = self.text("command", "", "the command that started the run, for the record")
+        self.replaces = self.switch("replaces", False, "remove the bag of resume when it is copied into the new one")
         if not out:
             raise UserError("recorder: the parameter out is empty; the folder of a new bag is needed")
         self.path = out
@@ -67,6 +73,8 @@ class Recorder(LimbNode):
         # What has come before the bag is open.
         self.early: dict[str, list[bytes]] = {topic: [] for topic in (*SENDERS, *OTHERS)}
         self.announced = -2
+        # What is being brought to the disk, and up to which tick.
+        self.flushed: tuple[Future[None], int] | None = None
         self.parameters: dict[str, dict[str, Any]] = {"recorder": parameter_values(self)}
         self.askers: dict[str, AsyncParameterClient] = {}
         self.asked: dict[str, float] = {}
@@ -158,7 +166,18 @@ class Recorder(LimbNode):
         self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.part.expected, *reports)})
         if self.description is not None:
             self.write("robot_description", 0, String(data=self.description))
+        if self.resume:
+            self.copy_past()
         self.announce()
+
+    def copy_past(self) -> None:
+        """Write what has been recorded before."""
+        assert self.writer is not None
+        for message in self.recorded_run().up_to(self.part.complete):
+            self.writer.write_raw(message.topic, message.time, message.data, message.type)
+        if self.replaces:
+            self.writer.flush().result()
+            shutil.rmtree(self.resume)
 
     def write(self, topic: str, stamp: int, message: Any) -> None:
         """Write a message of rclpy."""
@@ -215,16 +234,17 @@ class Recorder(LimbNode):
         self.announce()
 
     def announce(self) -> None:
-        """Publish the newest tick that is there on every topic."""
+        """Publish the newest tick that is on the disk on every topic."""
         part = self.part
         if self.writer is None or not part.identity:
             return
         complete = part.complete
         part.finished = 0 <= part.last_tick <= complete
-        if complete > self.announced:
-            self.announced = complete
-            tick = complete if part.counts["joint_states"] else -1
-            self.progress.publish(Header(frame_id=part.identity, stamp=stamp_at(tick, self.ticks)))
+        if self.flushed is None and complete >= self.announced + (FLUSHED if self.announced >= 0 else 1):
+            self.flushed = self.writer.flush(), complete
+        if self.flushed is not None and self.flushed[0].done():
+            (_, self.announced), self.flushed = self.flushed, None
+            self.progress.publish(Header(frame_id=part.identity, stamp=stamp_at(self.announced, self.ticks)))
 
     def destroy_node(self) -> None:
         """Close the bag, so that it is readable however the run ended."""

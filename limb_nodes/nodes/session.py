@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+import math
+import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,11 +18,12 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
-from limb_nodes.errors import FieldError, UserError
+from limb_nodes.errors import FieldError, RunError, UserError
 from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.exchange.watch import Watch
 from limb_nodes.foundation.topics import NODES
 from limb_nodes.nodes.activation_input import ActivationInput
-from limb_nodes.nodes.children import Child, stop
+from limb_nodes.nodes.children import Crew
 from limb_nodes.nodes.distribution import make_executor
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
 from limb_nodes.nodes.messages import tick_of
@@ -38,6 +41,8 @@ CLASSES = {
 }
 # How long nodes in processes of their own may take to the first tick (s); a slow machine compiles a limb for minutes.
 STARTING = 300.0
+# How much later than its nodes a run gives up waiting, and after which time it says that it waits (s).
+SLACK, SOON = 5.0, 3.0
 # How long other nodes of the domain may take to be found (s).
 DISCOVERY = 1.0
 # How long an executor waits for something to happen before the run is looked at again (s).
@@ -111,20 +116,19 @@ def run_in_processes(settings: RunSettings, progress: Progress) -> Outcome:
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     observer = Observer(settings, context)
     executor = make_executor(context)
-    children: dict[str, Child] = {}
+    crew = Crew(settings, lambda: observer.recorded)
     try:
         refuse_neighbours(context, settings.namespace)
         executor.add_node(observer)
-        for name in NODES:
-            children[name] = Child(settings, name)
-        seconds = await_the_end(executor, observer, children, interrupt, progress)
-        stop(children)
+        crew.start()
+        seconds = await_the_end(executor, observer, crew, interrupt, progress)
+        crew.stop()
         if interrupt.wanted and not Path(settings.out).exists():
             return Outcome(0, 0, 0, 0, 0, 0, 0.0, True)
-        children["recorder"].raise_failure()
+        crew["recorder"].raise_failure()
         return recorded_outcome(settings, seconds, interrupt.wanted)
     finally:
-        stop(children)
+        crew.stop()
         close(context, executor, [observer])
 
 
@@ -134,12 +138,25 @@ class Observer(Node):
     def __init__(self, settings: RunSettings, context: Context) -> None:
         super().__init__("limb_run", context=context, namespace=settings.namespace or None)
         self.recorded = -1
+        # The nodes themselves say what they wait for, unless all stand still.
+        self._watch = Watch(settings.stall_limit + SLACK, math.inf, SOON)
         self._identity, self._ticks = settings.identity, Ticks(settings.rate)
         self.create_subscription(Header, "recorder_progress", self._on_progress, STREAM)
 
     def _on_progress(self, message: Header) -> None:
         if message.frame_id == self._identity:
             self.recorded = tick_of(message.stamp, self._ticks)
+
+    def look(self, crew: Crew) -> None:
+        """Say if nothing is recorded; raise RunError if that has lasted too long."""
+        said = self._watch.look(time.monotonic(), self.recorded, "a tick")
+        if said or self._watch.given_up:
+            stopped = crew.stopped()
+            what = f"no tick has been recorded for {self._watch.waited:.0f} s"
+            what += f"; stopped by somebody: {stopped}" if stopped else "; the nodes say what they wait for"
+            if self._watch.given_up:
+                raise RunError(what)
+            print(f"limb: {what}", file=sys.stderr)
 
     def why_nothing_comes(self) -> str:
         """What to look at if a run does not begin."""
@@ -151,20 +168,20 @@ class Observer(Node):
 
 
 def await_the_end(
-    executor: Executor, observer: Observer, children: Mapping[str, Child], interrupt: Interrupt, progress: Progress
+    executor: Executor, observer: Observer, crew: Crew, interrupt: Interrupt, progress: Progress
 ) -> float:
     """Wait until the recorder has ended or the run is interrupted; the wall time since the first tick (s).
 
     Raises UserError if a node fails or none makes a tick.
     """
     begun, started = time.monotonic(), None
-    while children["recorder"].status is None and not interrupt.wanted:
+    while crew["recorder"].status != 0 and not interrupt.wanted:
         executor.spin_once(timeout_sec=TURN)
         progress(observer.recorded)
         if started is None and observer.recorded > 0:
             started = time.monotonic()
-        for child in children.values():
-            child.raise_failure()
+        crew.look()
+        observer.look(crew)
         if started is None and time.monotonic() - begun > STARTING:
             raise UserError(f"no tick within {STARTING:g} s; {observer.why_nothing_comes()}")
     ended = time.monotonic()

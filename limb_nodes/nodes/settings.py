@@ -12,6 +12,7 @@ from limb_nodes.bags.read import BagReader
 from limb_nodes.errors import FieldError
 from limb_nodes.exchange.identity import new_identity
 from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.exchange.watch import STALL, STALL_LIMIT
 from limb_nodes.foundation.topics import NODES, STATES
 from limb_nodes.model import load_limb
 from limb_nodes.nodes.live_readers import reader
@@ -31,7 +32,8 @@ class RunSettings:
 
     duration: s, 0 for the whole source. out: folder of the bag. namespace: of all nodes. states: topics of states to
     record, every `state_every` ticks. command: that started the run, for the record. live: how a live source is taken.
-    identity: of the run.
+    identity: of the run. resume: bag of the run that this one goes on with, empty for a new one. stall_limit: end the
+    run if no tick has come for so long (s). respawn: start nodes that are killed anew.
     """
 
     limb: str
@@ -46,10 +48,20 @@ class RunSettings:
     command: str = ""
     live: LiveSettings = field(default_factory=LiveSettings)
     identity: str = field(default_factory=new_identity)
+    resume: str = ""
+    stall_limit: float = STALL_LIMIT
+    respawn: bool = False
 
     def parameters(self, node: str) -> dict[str, Any]:
         """The ROS parameters of a node."""
-        common = {"limb": self.limb, "mode": self.mode, "rate": self.rate, "identity": self.identity}
+        common = {
+            "limb": self.limb,
+            "mode": self.mode,
+            "rate": self.rate,
+            "identity": self.identity,
+            "resume": self.resume,
+            "stall_limit": self.stall_limit,
+        }
         own: dict[str, dict[str, Any]] = {
             "activation_input": {"source": self.source, "duration": self.duration, **asdict(self.live)},
             "muscle_stack": {
@@ -91,6 +103,7 @@ def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
     Ticks(settings.rate)
     check_namespace(settings.namespace)
     refuse_existing(Path(settings.out))
+    STALL.check(settings.stall_limit)
     tick = 1 / settings.rate
     if settings.duration and not tick <= settings.duration <= LONGEST:
         raise FieldError(
@@ -110,8 +123,9 @@ def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
         raise FieldError("source", "is missing; in lockstep a bag, CSV, waveform YAML or constants are needed")
     else:
         reader(limb.muscle_names, settings.live)
+    resume = str(Path(settings.resume).resolve()) if settings.resume else ""
     limb_file, out = str(Path(settings.limb).resolve()), str(Path(settings.out).resolve())
-    return replace(settings, limb=limb_file, out=out, source=source), final
+    return replace(settings, limb=limb_file, out=out, source=source, resume=resume), final
 
 
 def recorded_outcome(settings: RunSettings, seconds: float, interrupted: bool) -> Outcome:
