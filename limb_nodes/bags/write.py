@@ -213,7 +213,7 @@ class BagWriter:
         if self._failure is not None:
             self._told = True
             raise RunError(
-                f"{self.path}: cannot be written: {self._failure}; "
+                f"{self.path}: cannot be written: {self._failure or type(self._failure).__name__}; "
                 f"`limb recover {self.path}` makes a readable bag of what is there"
             )
 
