@@ -68,9 +68,12 @@ class Case:
     values: Mapping[str, Any] = field(default_factory=dict)
     states: bool = False
 
-    def build(self, folder: Path | None = None) -> Limb:
-        """The limb of this case, from the shipped one or the one in another folder. Raises UserError."""
-        limb = load_limb(shipped(self.limb, folder))
+    def build(self, folder: Path | None = None, allow_laws: bool = False) -> Limb:
+        """The limb of this case, from the shipped one or the one in another folder, as `load_limb` takes it.
+
+        Raises UserError.
+        """
+        limb = load_limb(shipped(self.limb, folder), allow_laws)
         units = [len(muscle.units) for muscle in limb.muscles]
         if len(limb.segments) != 1 or limb.muscle_names != ["flexor", "extensor"] or units != [1, 1]:
             raise UserError(

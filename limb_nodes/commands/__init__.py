@@ -5,6 +5,7 @@ What is wrong with an option ends in a FieldError whose field is the option's `d
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,20 @@ def output_file(field: str, name: str, endings: tuple[str, ...] = SUFFIXES) -> P
     if not path.parent.is_dir():
         raise FieldError(field, f"is {name}; a folder that exists is needed, unlike {path.parent}")
     return path
+
+
+def add_limb(parser: argparse.ArgumentParser) -> None:
+    """Add the limb that a command takes, and consent to the code that it may name."""
+    parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
+    add_allow_laws(parser)
+
+
+def add_allow_laws(parser: argparse.ArgumentParser) -> None:
+    """Add consent to code from a file, for commands that run laws."""
+    parser.add_argument(
+        "--allow-laws", action="store_true",
+        help="run the code of the limb's own laws, this time, also if it is not trusted (see `limb trust`)",
+    )  # fmt: skip
 
 
 @contextmanager

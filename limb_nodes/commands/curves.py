@@ -6,7 +6,7 @@ import argparse
 
 from limb_nodes.analysis.curves import characteristics
 from limb_nodes.analysis.style import SUFFIXES
-from limb_nodes.commands import output_file, writing
+from limb_nodes.commands import add_limb, output_file, writing
 from limb_nodes.errors import UserError
 from limb_nodes.model import load_limb
 
@@ -19,14 +19,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Draw the characteristics of a limb's laws with their units: force by velocity, length and "
         "frequency, passive force, recruitment, activation, tendons, paths, moment arms and pennation.",
     )
-    parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
+    add_limb(parser)
     parser.add_argument("-o", "--out", required=True, metavar="FILE.png", help=f"the picture; {', '.join(SUFFIXES)}")
 
 
 def run(args: argparse.Namespace) -> int:
     """Draw, and say what was drawn."""
     out = output_file("out", args.out)
-    limb = load_limb(args.limb)
+    limb = load_limb(args.limb, args.allow_laws)
     if not limb.muscles:
         raise UserError(f"{args.limb}: muscles is empty; at least one is needed, for only muscles have characteristics")
     from limb_nodes.analysis.curves.picture import draw_characteristics

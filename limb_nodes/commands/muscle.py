@@ -8,7 +8,7 @@ import math
 from typing import TYPE_CHECKING
 
 from limb_nodes.analysis.style import SUFFIXES
-from limb_nodes.commands import output_file, writing
+from limb_nodes.commands import add_limb, output_file, writing
 from limb_nodes.errors import FieldError
 from limb_nodes.foundation.parameter import Parameter
 
@@ -30,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Take a muscle off its limb, prescribe the length from its origin to its insertion and its "
         "activation, and show its force, fibre and tendon length, pennation and the frequencies of its motor units.",
     )
-    parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
+    add_limb(parser)
     parser.add_argument("muscle", metavar="MUSCLE", help="the muscle's name")
     length = parser.add_mutually_exclusive_group()
     length.add_argument(
@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     from limb_nodes.model import load_limb
     from limb_nodes.solve.bench import MuscleBench
 
-    limb = load_limb(args.limb)
+    limb = load_limb(args.limb, args.allow_laws)
     bench = MuscleBench(limb, args.muscle)
     course = course_of(args, bench)
     activation = activation_of(args, bench, course)

@@ -12,6 +12,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from limb_nodes.commands import add_limb
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.foundation.text_table import aligned
 
@@ -27,7 +28,7 @@ def add_parser(subparsers: Any) -> None:
         help="solve a limb as one system of equations, without ROS",
         description="Solve the whole model over an activation and print where the limb ends; --out records a bag.",
     )
-    parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
+    add_limb(parser)
     parser.add_argument(
         "--activation",
         dest="source",
@@ -44,10 +45,10 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Solve, record, print a summary."""
     from limb_nodes.bags.folder import refuse_existing
-    from limb_nodes.model import load_limb, user_sources
+    from limb_nodes.model import load_limb
     from limb_nodes.signals.activation import load_activation
 
-    limb = load_limb(args.limb)
+    limb = load_limb(args.limb, args.allow_laws)
     if args.tolerance is not None:
         Parameter("tolerance", "1", "relative error per step", minimum=1e-14, maximum=1e-2).check(args.tolerance)
     if args.out:
@@ -67,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
         info = {
             "limb": limb.text,
             "limb_file": limb.file,
-            "laws": user_sources(limb),
+            "laws": limb.code.sources,
             "command": shlex.join(["limb", *sys.argv[1:]]),
             "rate": args.rate,
             "period_ns": round(1e9 / args.rate),

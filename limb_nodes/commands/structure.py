@@ -11,7 +11,7 @@ from limb_nodes.analysis.structure import TITLES, analyse
 from limb_nodes.analysis.structure.data import structure_data
 from limb_nodes.analysis.structure.table import report
 from limb_nodes.analysis.style import SUFFIXES
-from limb_nodes.commands import output_file, writing
+from limb_nodes.commands import add_limb, output_file, writing
 from limb_nodes.errors import FieldError
 from limb_nodes.model import load_limb
 
@@ -30,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "degrees of freedom, the differential index, and which equations must be solved together. Exit status 1 if "
         "what is solved (all but the original form of the limb) is singular or has an index above 1.",
     )
-    parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
+    add_limb(parser)
     parser.add_argument("--level", choices=list(TITLES), help="this level only, with its whole matrix")
     parser.add_argument("--json", action="store_true", help="print JSON; docs/structure.md lists its keys")
     parser.add_argument("-o", "--out", metavar="FILE.png", help=f"draw the matrices; {', '.join(SUFFIXES)}")
@@ -39,7 +39,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Print and draw; 1 if what is solved cannot be solved as it stands."""
     out = output_file("out", args.out) if args.out else None
-    limb = load_limb(args.limb)
+    limb = load_limb(args.limb, args.allow_laws)
     findings = analyse(limb, args.level)
     if not findings:
         raise FieldError("level", f"is {args.level}; a level that a muscle of this limb has is needed", args.limb)

@@ -2,8 +2,7 @@
 
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
-from limb_nodes.model.load import load_limb, parse_limb, with_values
-from limb_nodes.model.user_sources import user_sources
+from limb_nodes.model.load import load_limb, outline, parse_limb, with_values
 
 __all__ = [
     "ChosenLaw",
@@ -12,7 +11,7 @@ __all__ = [
     "Muscle",
     "Segment",
     "load_limb",
+    "outline",
     "parse_limb",
-    "user_sources",
     "with_values",
 ]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from limb_nodes.model.chosen import ChosenLaw
+from limb_nodes.model.user_code import UserCode
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Muscle:
 class Limb:
     """A limb. Angles in rad, lengths in m, forces in N, in the plane x right, y up.
 
-    text, file: the YAML that it was read from; content: the same as plain data.
+    text, file: the YAML that it was read from; content: the same as plain data. code: the user's own that it names.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Limb:
     file: str = field(compare=False)
     text: str = field(compare=False)
     content: dict[str, Any] = field(compare=False)
+    code: UserCode = field(compare=False)
 
     @property
     def joint_names(self) -> list[str]:

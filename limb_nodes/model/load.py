@@ -20,7 +20,9 @@ from limb_nodes.model.check import check_geometry, check_unit
 from limb_nodes.model.check_law import check_laws
 from limb_nodes.model.choice import choose_law
 from limb_nodes.model.chosen import ChosenLaw
+from limb_nodes.model.consent import require_consent
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
+from limb_nodes.model.user_code import NO_CODE, UserCode, named_modules, user_code
 
 BASE_ANGLE = Parameter(
     "base_angle",
@@ -76,24 +78,43 @@ ORDER = Parameter("order", "1", "place in the recruitment order, R_F", 0.0, "pos
 ROLES = {"flexor": 1.0, "extensor": -1.0}
 
 
-def load_limb(path: str | Path) -> Limb:
+def load_limb(path: str | Path, allow_laws: bool = False) -> Limb:
     """Read and check a limb's YAML file.
 
+    allow_laws: whether code that the file names may run although the user has not trusted it.
     Raises UserError, one line with file, place, value and what is allowed.
     """
     content, text = read_yaml(Path(path))
-    return build_limb(content, str(path), text)
+    return build_limb(content, str(path), text, allowed_code(content, str(path), allow_laws))
 
 
-def parse_limb(text: str, file: str) -> Limb:
+def parse_limb(text: str, file: str, allow_laws: bool = False) -> Limb:
     """The same from text, such as a bag holds it; `file` appears in errors."""
-    return build_limb(parse_yaml(text, file), file, text)
+    content = parse_yaml(text, file)
+    return build_limb(content, file, text, allowed_code(content, file, allow_laws))
 
 
-def with_values(limb: Limb, values: Mapping[str, Any]) -> Limb:
+def outline(text: str, file: str) -> Limb:
+    """A limb to be looked at, whatever its text names: none of its code runs.
+
+    A law of the user's own has no equations then, and the numbers of its section for parameters; nothing is checked
+    that would need them. Raises UserError.
+    """
+    return build_limb(parse_yaml(text, file), file, text, None)
+
+
+def allowed_code(content: Any, file: str, allow_laws: bool) -> UserCode:
+    """The code that a limb's content names. Raises FieldError if it may not run."""
+    code = user_code(content, file)
+    require_consent(code, file, allow_laws)
+    return code
+
+
+def with_values(limb: Limb, values: Mapping[str, Any], allow_laws: bool = False) -> Limb:
     """A limb with other values at places such as ``muscles[0].tendon.stiffness``.
 
-    A place that is not in the limb's file is added; all checks run again. Raises UserError.
+    A place that is not in the limb's file is added; all checks run again. allow_laws: as for `load_limb`, if a value
+    names code that the limb did not. Raises UserError.
     """
     content = unshared(limb.content)
     for place, value in values.items():
@@ -113,7 +134,9 @@ def with_values(limb: Limb, values: Mapping[str, Any]) -> Limb:
             target[steps[-1]] = value.item() if hasattr(value, "item") else value
         except (IndexError, TypeError):
             raise UserError(f"{limb.file}: {place} is not a place; a key of the limb is needed") from None
-    return build_limb(content, limb.file, yaml_text(content))
+    known = limb.code.modules.keys() >= set(named_modules(content))
+    code = limb.code if known else allowed_code(content, limb.file, allow_laws)
+    return build_limb(content, limb.file, yaml_text(content), code)
 
 
 def unshared(content: Any) -> Any:
@@ -125,8 +148,8 @@ def unshared(content: Any) -> Any:
     return copy.deepcopy(content)
 
 
-def build_limb(content: Any, file: str, text: str) -> Limb:
-    """Check the content of a limb's file and make a `Limb` of it."""
+def build_limb(content: Any, file: str, text: str, code: UserCode | None = NO_CODE) -> Limb:
+    """Check the content of a limb's file and make a `Limb` of it. code: the user's own, which runs; see `outline`."""
     top = Section(file, "", content)
     segments = tuple(read_segment(section) for section in top.sections("segments", required=True))
     joints = [segment.joint for segment in segments]
@@ -135,7 +158,7 @@ def build_limb(content: Any, file: str, text: str) -> Limb:
     sarcomeres = read_named(top, "sarcomeres")
     kinds = read_named(top, "unit_kinds")
     muscles = tuple(
-        read_muscle(section, joints, sarcomeres, kinds) for section in top.sections("muscles", required=False)
+        read_muscle(section, joints, sarcomeres, kinds, code) for section in top.sections("muscles", required=False)
     )
     refuse_duplicates(top, "muscles", "name", [muscle.name for muscle in muscles])
     limb = Limb(
@@ -150,11 +173,13 @@ def build_limb(content: Any, file: str, text: str) -> Limb:
         file=file,
         text=text,
         content=content,
+        code=code or NO_CODE,
     )
     top.finish()
-    for muscle in muscles:
-        check_geometry(file, muscle, segments[muscle.joint])
-    check_laws(limb)
+    if code is not None:
+        for muscle in muscles:
+            check_geometry(file, muscle, segments[muscle.joint])
+        check_laws(limb)
     return limb
 
 
@@ -181,18 +206,19 @@ def read_muscle(
     joints: list[str],
     sarcomeres: dict[str, Section],
     kinds: dict[str, Section],
+    code: UserCode | None,
 ) -> Muscle:
     """One entry of `muscles`."""
     name = section.text("name")
     joint = section.choice("joint", joints)
     role = ROLES[section.choice("role", ROLES)]
     threshold = present(section.number(ACTIVATION_THRESHOLD))
-    laws = {process: choose_law(section, process) for process in MUSCLE_PROCESSES}
-    of_units = {name: choose_law(section, name) for name in UNIT_PROCESSES if CONTRACTS[name].section == "muscle"}
+    laws = {process: choose_law(section, process, code) for process in MUSCLE_PROCESSES}
+    of_units = {name: choose_law(section, name, code) for name in UNIT_PROCESSES if CONTRACTS[name].section == "muscle"}
     units: list[tuple[float, MotorUnit]] = []
     for position, unit_section in enumerate(section.sections("units", required=True)):
         names = {unit.name for _, unit in units}
-        new = read_units(unit_section, position, sarcomeres, kinds, of_units)
+        new = read_units(unit_section, position, sarcomeres, kinds, of_units, code)
         for _, unit in new:
             if unit.name in names:
                 section.fail(f"units[{position}].name", f"is {unit.name!r} a second time; a name of its own is needed")
@@ -213,6 +239,7 @@ def read_units(
     sarcomeres: dict[str, Section],
     kinds: dict[str, Section],
     given: dict[str, ChosenLaw],
+    code: UserCode | None,
 ) -> list[tuple[float, MotorUnit]]:
     """One entry of `units`: `count` units with their place in the recruitment order.
 
@@ -231,9 +258,12 @@ def read_units(
             f"is {values['maximum_frequency']:g}; a number > minimum_frequency "
             f"({values['minimum_frequency']:g}) in Hz is needed",
         )
-    laws = {name: given[name] if name in given else choose_law(section, name, sarcomeres) for name in UNIT_PROCESSES}
+    laws = {
+        name: given[name] if name in given else choose_law(section, name, code, sarcomeres) for name in UNIT_PROCESSES
+    }
     section.finish()
-    check_unit(section, laws)
+    if code is not None:
+        check_unit(section, laws)
     names = [name] if count == 1 else [f"{name}_{index + 1}" for index in range(count)]
     return [(order, MotorUnit(one, dict(values), laws)) for one in names]
 

@@ -30,7 +30,6 @@ from limb_nodes.exchange.identity import is_identity
 from limb_nodes.exchange.recording import RecordingPart
 from limb_nodes.exchange.stream import RECORDER_LAG
 from limb_nodes.foundation.topics import LATCHED_TOPICS, NODES, SENDERS, TOPIC_TYPES
-from limb_nodes.model import user_sources
 from limb_nodes.nodes.base import LimbNode
 from limb_nodes.nodes.distribution import parameter_values, taken
 from limb_nodes.nodes.live_source import LOOK_PERIOD, QUIET, quality_for
@@ -189,7 +188,7 @@ class Recorder(LimbNode):
         return {
             "limb": self.limb.text,
             "limb_file": self.limb.file,
-            "laws": user_sources(self.limb),
+            "laws": self.limb.code.sources,
             "command": self.command,
             "rate": self.ticks.rate,
             "period_ns": self.ticks.nanoseconds,

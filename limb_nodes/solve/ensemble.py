@@ -18,6 +18,7 @@ from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.limb import Limb
 from limb_nodes.model.load import build_limb
+from limb_nodes.model.user_code import UserCode
 from limb_nodes.solve.course import METHODS, Stretch, stretch_of
 from limb_nodes.solve.variants import Values, Variants
 from limb_nodes.solve.whole import TOLERANCE, Movement, WholeModel
@@ -59,10 +60,11 @@ class Order:
     function: Callable[[Movement], Any] | None
     tolerance: float
     method: str
+    code: UserCode
 
     def limb(self) -> Limb:
         """The limb of all samples."""
-        return build_limb(self.content, self.file, self.text)
+        return build_limb(self.content, self.file, self.text, self.code)
 
 
 class SampleSolver:
@@ -144,7 +146,7 @@ class Ensemble:
         function: called with the `Movement` of a sample, all outputs filled in; its result then takes
             the place of the `Solution`. On a cluster it must be picklable.
         threads: default: one per core of this process. client: a `dask.distributed.Client`, whose
-            workers then do the work; they need this package and the limb's own laws at the same place.
+            workers then do the work; they need this package. The limb's own laws go to them.
         ordered: whether results come in the order of the samples or as they are there.
 
         A sample that cannot be built or solved, or whose `function` raises, gives its exception as its
@@ -170,6 +172,7 @@ class Ensemble:
             function,
             self.tolerance,
             self.method,
+            limb.code,
         )
         numbered = enumerate(one_by_one(limb, samples))
         if client is not None:

@@ -233,13 +233,13 @@ def limb(tmp_path_factory):
         ("any_python", ANY_PYTHON),
     ):
         (folder / f"{name}.py").write_text(text, encoding="utf-8")
-    return load_limb(folder / "limb.yaml")
+    return load_limb(folder / "limb.yaml", allow_laws=True)
 
 
 def said(limb, place: str, law: str) -> str:
     """What is said about a law at a place, without the file and the place."""
     with pytest.raises(UserError) as caught:
-        with_values(limb, {place: {"law": law}})
+        with_values(limb, {place: {"law": law}}, allow_laws=True)
     text = str(caught.value)
     assert "\n" not in text
     start = f"{limb.file}: {place}.law is "
@@ -347,12 +347,15 @@ def test_recruitment_law_is_refused(limb):
     ],
 )
 def test_law_is_accepted(limb, place, law):
-    with_values(limb, {place: {"law": law}})
+    with_values(limb, {place: {"law": law}}, allow_laws=True)
 
 
 def test_an_equation_of_parameters_alone_may_be_any_python(limb):
     law = (
-        with_values(limb, {f"{KIND}.force_length": {"law": "any_python:free"}}).muscles[0].units[0].laws["force_length"]
+        with_values(limb, {f"{KIND}.force_length": {"law": "any_python:free"}}, allow_laws=True)
+        .muscles[0]
+        .units[0]
+        .laws["force_length"]
     )
     probe = Probe(law, given(law), {"optimal_sarcomere_length": 2.7e-6})
     grid = [math.exp(-(((0.01 * i - 1.0) / 0.5) ** 2)) for i in range(201)]

@@ -15,7 +15,7 @@ from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.foundation.yaml_text import parse_yaml
-from limb_nodes.model import Limb, parse_limb
+from limb_nodes.model import Limb, outline
 from limb_nodes.signals.envelope_bag import ANGLE_TOPIC, ENVELOPE_TOPIC, RAW_TOPIC, read_raw
 
 DRAWN = ("activation", ENVELOPE_TOPIC, "motor_unit_state", "muscle_state", "joint_torque", "joint_states", ANGLE_TOPIC)
@@ -245,9 +245,9 @@ def _limb(info: dict[str, Any], path: str) -> tuple[Limb | None, list[str]]:
     if not isinstance(text, str):
         return None, []
     try:
-        return parse_limb(text, str(info.get("limb_file") or path)), []
+        return outline(text, str(info.get("limb_file") or path)), []
     except UserError as error:
-        # A law of the user's own may be missing here; the recording can be drawn nevertheless.
+        # The recording can be drawn nevertheless.
         return None, [f"drawn without the limb, which can't be read: {error}"]
 
 
