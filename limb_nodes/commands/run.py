@@ -8,6 +8,7 @@ import shlex
 import sys
 from typing import Any
 
+from limb_nodes.commands import add_limb
 from limb_nodes.errors import FieldError
 
 # Exit status of a run whose live source never came, or was silent at its end.
@@ -23,7 +24,7 @@ def add_parser(subparsers: Any) -> None:
         "Exit status 3 if a live source never came or was silent at the end; 1 if the run could not be finished, or if "
         "somebody else published in its name.",
     )
-    parser.add_argument("limb", metavar="LIMB.yaml", nargs="?", default="", help="the limb (default: that of --resume)")
+    add_limb(parser, default="that of --resume")
     parser.add_argument(
         "--activation",
         dest="source",
@@ -94,6 +95,7 @@ def run(args: argparse.Namespace) -> int:
     Parameter("state_every", "1", "ticks", minimum=1, maximum=1e6, integer=True).check(args.state_every)
     settings = RunSettings(
         limb=args.limb,
+        allow_laws=args.allow_laws,
         source=args.source,
         rate=args.rate,
         duration=args.duration or 0.0,

@@ -15,7 +15,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limb_nodes.commands import writing
+from limb_nodes.commands import add_allow_laws, writing
 from limb_nodes.errors import FieldError
 from limb_nodes.foundation.text_table import aligned
 
@@ -44,6 +44,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--limbs", metavar="DIR", help="take reference_joint.yaml and reference_joint_tendon.yaml from here"
     )
+    add_allow_laws(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
     cases = chosen(args.case, CASES)
     folder = Path(args.limbs) if args.limbs else None
-    limbs = {case.name: case.build(folder) for case in cases}
+    limbs = {case.name: case.build(folder, args.allow_laws) for case in cases}
     pictures = make_folder(args.figures) if args.figures else None
     ways = ("whole",) if args.whole else ("graph",) if args.graph else WAYS
     trajectories: dict[str, dict[str, Trajectory]] = {case.name: {} for case in cases}
@@ -132,6 +133,8 @@ def solve_graph(case: Case, limb: Limb) -> Trajectory:
             namespace=f"/limb_verify_{os.getpid()}_{case.name.replace('.', '_').replace('-', '_')}",
             states=STATES if case.states else (),
             command=shlex.join(["limb", *sys.argv[1:]]),
+            # What may run was asked when the limb was loaded.
+            allow_laws=True,
         )
         try:
             outcome = run_in_one_process(settings, lambda tick: None)
@@ -146,9 +149,13 @@ def solve_graph(case: Case, limb: Limb) -> Trajectory:
 
 
 def write_limb(limb: Limb, path: Path) -> None:
-    """Write a limb as it is now, which its text may not say."""
+    """Write a limb as it is now, which its text may not say, and its own laws beside it."""
     from ruamel.yaml import YAML
 
+    for name, text in limb.code.sources.items():
+        law = path.parent / name
+        law.parent.mkdir(parents=True, exist_ok=True)
+        law.write_text(text, encoding="utf-8")
     with path.open("w", encoding="utf-8") as file:
         YAML(typ="safe", pure=True).dump(limb.content, file)
 

@@ -52,7 +52,8 @@ class LimbNode(Node):
         path = self.text("limb", "", "the limb's YAML file")
         if not path:
             raise UserError(f"{name}: the parameter limb is empty; the path of a limb's YAML file is needed")
-        self.limb: Limb = load_limb(path)
+        allow_laws = self.switch("allow_laws", False, "run the code of the limb's own laws, also if it is not trusted")
+        self.limb: Limb = load_limb(path, allow_laws)
         self.mode = self.choice("mode", MODES, "lockstep: tick after tick as fast as possible; realtime: by the clock")
         self.ticks = Ticks(self.number("rate", 1000.0, "ticks per second of simulation time", 0.0, 100_000.0))
         self.given_identity = self.text(

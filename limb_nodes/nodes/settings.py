@@ -32,8 +32,9 @@ class RunSettings:
 
     duration: s, 0 for the whole source. out: folder of the bag. namespace: of all nodes. states: topics of states to
     record, every `state_every` ticks. command: that started the run, for the record. live: how a live source is taken.
-    identity: of the run. resume: bag of the run that this one goes on with, empty for a new one. stall_limit: end the
-    run if no tick has come for so long (s). respawn: start nodes that are killed anew.
+    identity: of the run. allow_laws: whether the code of the limb's own laws may run although it is not trusted.
+    resume: bag of the run that this one goes on with, empty for a new one. stall_limit: end the run if no tick has come
+    for so long (s). respawn: start nodes that are killed anew.
     """
 
     limb: str
@@ -48,6 +49,7 @@ class RunSettings:
     command: str = ""
     live: LiveSettings = field(default_factory=LiveSettings)
     identity: str = field(default_factory=new_identity)
+    allow_laws: bool = False
     resume: str = ""
     stall_limit: float = STALL_LIMIT
     respawn: bool = False
@@ -56,6 +58,7 @@ class RunSettings:
         """The ROS parameters of a node."""
         common = {
             "limb": self.limb,
+            "allow_laws": self.allow_laws,
             "mode": self.mode,
             "rate": self.rate,
             "identity": self.identity,
@@ -99,7 +102,7 @@ def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
 
     Raises FieldError, or UserError for what is wrong in a file.
     """
-    limb = load_limb(settings.limb)
+    limb = load_limb(settings.limb, settings.allow_laws)
     Ticks(settings.rate)
     check_namespace(settings.namespace)
     refuse_existing(Path(settings.out))
