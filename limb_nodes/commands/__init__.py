@@ -24,9 +24,11 @@ def output_file(field: str, name: str, endings: tuple[str, ...] = SUFFIXES) -> P
     return path
 
 
-def add_limb(parser: argparse.ArgumentParser) -> None:
-    """Add the limb that a command takes, and consent to the code that it may name."""
-    parser.add_argument("limb", metavar="LIMB.yaml", help="the limb")
+def add_limb(parser: argparse.ArgumentParser, default: str = "") -> None:
+    """Add the limb that a command takes, and consent to the code that it may name; default: in words, if it has one."""
+    optional: dict[str, str] = {"nargs": "?", "default": ""} if default else {}
+    help_text = f"the limb (default: {default})" if default else "the limb"
+    parser.add_argument("limb", metavar="LIMB.yaml", help=help_text, **optional)  # type: ignore[arg-type]
     add_allow_laws(parser)
 
 

@@ -22,6 +22,8 @@ from limb_nodes.nodes.settings import RunSettings
 # How long a node may take to end when asked to (s): a recorder may have much to write.
 ENDING = 60.0
 ERROR = "limb: error: "
+# A child imports from where its parent does: `python -m` and `-c` look in the working folder before all others.
+START = "import sys; sys.path[:] = {path!r}; from limb_nodes.nodes.{name} import main; main()"
 # The order in which nodes are ended: the recorder last.
 ENDED = ("activation_input", "limb_dynamics", "muscle_stack", "recorder")
 
@@ -105,7 +107,7 @@ class Child:
             given = "'" + str(value).replace("'", "''") + "'" if isinstance(value, str) else text
             arguments += ["-p", f"{key}:={given}"]
         self.handle = subprocess.Popen(
-            [sys.executable, "-m", f"limb_nodes.nodes.{name}", *arguments],
+            [sys.executable, "-c", START.format(path=sys.path, name=name), *arguments],
             stderr=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stdin=subprocess.DEVNULL,
