@@ -10,7 +10,6 @@ import sys
 import tempfile
 from functools import cache
 from importlib import resources
-from pathlib import Path
 from types import ModuleType
 
 import numba
@@ -18,6 +17,7 @@ import numba
 from limb_nodes.model import chain as model_chain
 from limb_nodes.model.layout import Layout
 from limb_nodes.solve import chain, held
+from limb_nodes.solve.cache import cache_folder
 from limb_nodes.solve.generate import program
 
 IMPORTS = (
@@ -29,20 +29,6 @@ IMPORTS = (
 )
 # Modules whose functions become a part of every program.
 COMPILED_IN = (model_chain, chain, held)
-
-
-def cache_folder() -> Path:
-    """Where compiled programs are kept: LIMB_CACHE_DIR, or the user's cache folder."""
-    given = os.environ.get("LIMB_CACHE_DIR")
-    if given:
-        return Path(given)
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    folder = Path(base) / "limb_nodes"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return Path(tempfile.gettempdir()) / f"limb_nodes-{os.getuid()}"
-    return folder
 
 
 @cache
@@ -61,7 +47,6 @@ def compiled(layout: Layout) -> ModuleType:
         return sys.modules[name]
     path = cache_folder() / f"{name}.py"
     if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
         # Written aside and renamed, so that no other process reads half a file.
         handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
         with os.fdopen(handle, "w", encoding="utf-8") as file:
