@@ -22,8 +22,8 @@ from typing import Any
 from limb_nodes.errors import UserError
 from limb_nodes.levels import CONTRACTS
 
-# Names that no module of the user's has.
-NOT_THEIRS = sys.stdlib_module_names | {__name__.partition(".")[0]}
+# Names that no module of the user's has, whether they are in memory or not.
+NOT_THEIRS = sys.stdlib_module_names | {__name__.partition(".")[0], "numba", "numpy", "scipy"}
 # A limb's laws are a few short files.
 LARGEST, MOST = 2**20, 1000
 

@@ -124,6 +124,7 @@ def run(command: list[str], place: Path, where: str) -> str:
         "PYTHONPATH": str(ROOT),
         "ROS_LOG_DIR": str(place / ".ros"),
         "MPLBACKEND": "Agg",
+        "XDG_STATE_HOME": str(place / ".state"),
     }
     # A session of its own, so that what a block leaves running in the background ends with it.
     with subprocess.Popen(
