@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
 
     with tempfile.TemporaryDirectory(prefix="limb_trust_") as place:
         limb = Path(args.source)
-        if limb.suffix.lower() not in (".yaml", ".yml"):
+        if limb.is_dir() or limb.suffix.lower() not in (".yaml", ".yml"):
             limb = unpack(Path(place), run_info(args.source), args.source)
         code = code_of(limb)
     if not code.files:
