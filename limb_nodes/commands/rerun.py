@@ -14,7 +14,8 @@ from limb_nodes.commands import add_allow_laws, simulate
 from limb_nodes.commands import run as run_command
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.parameter import Parameter
-from limb_nodes.foundation.section import Section, describe, read_yaml
+from limb_nodes.foundation.section import Section, describe
+from limb_nodes.foundation.yaml_text import read_yaml
 from limb_nodes.model.consent import require_consent
 from limb_nodes.model.user_code import UserCode, user_code
 
@@ -90,13 +91,14 @@ def code_of(limb: Path) -> UserCode:
 
 def unpack(folder: Path, info: dict[str, Any], bag: str) -> Path:
     """Write limb and laws of a bag into a folder; the limb's file. Raises UserError."""
-    told = Section(bag, "", info)
-    laws = told.section("laws").content if told.has("laws") else {}
-    limb = Path(told.text("limb_file", "limb.yaml")).name
+    laws = info.get("laws") or {}
+    limb = Path(str(info.get("limb_file") or "")).name
     limb = "limb.yaml" if limb in ("", "..") else limb
-    for name, text in {**laws, limb: told.text("limb")}.items():
+    if not isinstance(laws, dict):
+        raise UserError(f"{bag}: laws is {describe(laws)}; a mapping of files to texts is needed")
+    for name, text in {**laws, limb: info["limb"]}.items():
         try:
-            path = (folder / name).resolve()
+            path = (folder / str(name)).resolve()
             inside = path.is_relative_to(folder.resolve()) and isinstance(text, str)
             if inside:
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -104,5 +106,7 @@ def unpack(folder: Path, info: dict[str, Any], bag: str) -> Path:
         except (OSError, ValueError):
             inside = False
         if not inside:
-            told.fail("laws", f"has {describe(name)}; texts of files within the folder of the limb are needed")
+            raise UserError(
+                f"{bag}: {describe(name)} is to be written; texts of files within the folder of the limb are needed"
+            )
     return folder / limb

@@ -6,6 +6,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
+from limb_nodes.errors import escaped
 from limb_nodes.model.consent import trust, trust_file
 
 
@@ -36,13 +37,8 @@ def run(args: argparse.Namespace) -> int:
     for module in code.files:
         print(f"{module.sha256}  {module.relative}")
         if args.show:
-            print(visible(module.text))
+            print(escaped(module.text, kept="\n\t"))
     if not args.show:
         trust(code, args.source)
         print(f"trusted, in {trust_file()}")
     return 0
-
-
-def visible(text: str) -> str:
-    """A text with signs that steer a terminal or change the order of others spelled out."""
-    return "".join(sign if sign.isprintable() or sign in "\n\t" else ascii(sign)[1:-1] for sign in text)

@@ -83,9 +83,7 @@ def find_law(section: Section, process: str, code: UserCode | None) -> tuple[Law
     law = getattr(module, attribute, None)
     if not isinstance(law, Law):
         where = getattr(module, "__file__", None) or "memory"
-        section.fail(
-            "law", f"is {name!r}; a law is needed, which {attribute} in {module_name} ({where}) is not"
-        )
+        section.fail("law", f"is {name!r}; a law is needed, which {attribute} in {module_name} ({where}) is not")
     elif law.process != process:
         section.fail("law", f"is {name!r}, a law of {law.process}; a law of {process} is needed")
     assert isinstance(law, Law)
