@@ -26,6 +26,8 @@ def bell(fibre_length_norm, width):
     """Force-length factor (1)."""
     return max(0.0, 1.0 - ((fibre_length_norm - 1.0) / width) ** 2)
 '''
+# A limb that is compiled in a few seconds.
+BARE = "name: bare\nsegments: [{name: a, mass: 1, length: 1, com_distance: 0.5, inertia: 0.1}]\n"
 SOURCE = "flexor=0.5,extensor=0.1"
 LONGEST = 120.0
 
@@ -47,7 +49,7 @@ def limb_with(law: str) -> str:
 
 @dataclass
 class Ground:
-    """A folder for one trial: `here`, where `limb` is started, `there`, where the files are, `home`, `tmp`, a mark.
+    """A folder for one trial: `here`, where `limb` starts, `there` with the files and a bare limb, `home`, `tmp`, a mark.
 
     last: how the process that ran last ended.
     """
@@ -61,6 +63,7 @@ class Ground:
             (self.folder / name).mkdir(parents=True)
         # As pip writes it: Python does not look in the working folder then.
         (self.folder / "bin" / "limb").write_text("import sys\nfrom limb_nodes.cli import main\nsys.exit(main())\n")
+        self.plant("there/bare.yaml", text=BARE)
         taken = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
         self.environment = {
             **taken,

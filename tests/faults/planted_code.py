@@ -6,22 +6,22 @@ import os
 import pickle
 import random
 import shutil
+import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
 from pathlib import Path
 
-from tests.faults.ground import PARAMS, SOURCE, Attempt, Ground, caches, done, tried
+from tests.faults.ground import PARAMS, Attempt, Ground, caches, done, tried
 from tests.faults.trial import Trial
 
 KIND = "code planted in folders and caches"
-LIMB = str(PARAMS / "reference_joint.yaml")
-SIMULATE = ("simulate", LIMB, "--activation", SOURCE, "--duration", "0.05")
+SIMULATE = ("simulate", "../there/bare.yaml", "--activation", "none=0", "--duration", "0.05")
 COMMANDS = {
     "simulate": SIMULATE,
     "run": ("run", *SIMULATE[1:], "--out", "out"),
     "run --processes": ("run", *SIMULATE[1:], "--out", "out", "--processes"),
-    "curves": ("curves", LIMB, "-o", "out.png"),
+    "curves": ("curves", str(PARAMS / "reference_joint.yaml"), "-o", "out.png"),
 }
 # Modules that these commands, their nodes and what they use import.
 MODULES = ("statistics", "rclpy", "numpy", "limb_nodes", "limb_msgs", "uuid", "numba", "matplotlib", "sitecustomize")
@@ -58,8 +58,6 @@ def warm() -> Path:
     if not list((caches() / "LIMB_CACHE_DIR").rglob("*.nbi")):
         for name in ("LIMB_CACHE_DIR", "NUMBA_CACHE_DIR"):
             (caches() / name).mkdir(mode=0o700, exist_ok=True)
-        import tempfile
-
         with tempfile.TemporaryDirectory() as folder:
             assert done(*Ground(Path(folder).resolve()).limb(*SIMULATE))
     return caches()
