@@ -49,7 +49,7 @@ def limb_with(law: str) -> str:
 
 @dataclass
 class Ground:
-    """A folder for one trial: `here`, where `limb` starts, `there` with the files and a bare limb, `home`, `tmp`, a mark.
+    """A folder for one trial: `here`, where `limb` starts, `there` with files and a bare limb, `home`, `tmp`, a mark.
 
     last: how the process that ran last ended.
     """

@@ -116,13 +116,21 @@ class _Bag:
         self.last = max(self.last, float(table["time"][-1]))
         return table
 
-    def cut(self, topic: str, table: dict[str, npt.NDArray[Any]], names: tuple[str, ...], field: str) -> Series:
-        """The part of a field that is to be drawn."""
+    def field(self, topic: str, table: dict[str, npt.NDArray[Any]], field: str) -> npt.NDArray[Any]:
+        """The values of a field; UserError if the messages do not have it."""
         if field not in table:
             raise UserError(
                 f"{self.reader.path}: topic {self.prefix}/{topic} has no field {field}; a bag of limb's is needed"
             )
-        values = table[field]
+        return table[field]
+
+    def names(self, topic: str, table: dict[str, npt.NDArray[Any]], field: str = "name") -> tuple[str, ...]:
+        """The names in a field."""
+        return tuple(str(text) for text in self.field(topic, table, field))
+
+    def cut(self, topic: str, table: dict[str, npt.NDArray[Any]], names: tuple[str, ...], field: str) -> Series:
+        """The part of a field that is to be drawn."""
+        values = self.field(topic, table, field)
         if values.shape[1:] != (len(names),):
             raise UserError(
                 f"{self.reader.path}: topic {self.prefix}/{topic} has {len(names)} names and "
@@ -178,7 +186,7 @@ def read_series(
         }
         if reference is None and bag.has(ANGLE_TOPIC):
             table = bag.table(ANGLE_TOPIC)
-            parts["reference"] = bag.cut(ANGLE_TOPIC, table, _names(table["name"]), "position")
+            parts["reference"] = bag.cut(ANGLE_TOPIC, table, bag.names(ANGLE_TOPIC, table), "position")
     if reference is not None:
         parts["reference"] = _read_recorded(reference, start, end)
     if "reference" in parts and "angle" in parts:
@@ -256,16 +264,12 @@ def _version(info: dict[str, Any]) -> str:
     return str(versions.get("limb_nodes", "")) if isinstance(versions, dict) else ""
 
 
-def _names(texts: npt.NDArray[Any]) -> tuple[str, ...]:
-    return tuple(str(text) for text in texts)
-
-
 def _read_drive(bag: _Bag) -> dict[str, Any]:
     topic = next((topic for topic in ("activation", ENVELOPE_TOPIC) if bag.has(topic)), None)
     if topic is None:
         return {}
     table = bag.table(topic)
-    drive = bag.cut(topic, table, _names(table["name"]), "activation")
+    drive = bag.cut(topic, table, bag.names(topic, table), "activation")
     return {"drive": drive, "is_envelope": topic == ENVELOPE_TOPIC}
 
 
@@ -293,8 +297,8 @@ def _read_units(bag: _Bag) -> dict[str, Any]:
     if not bag.has(topic):
         return {}
     table = bag.table(topic)
-    frequency = bag.cut(topic, table, _names(table["unit"]), "stimulation_frequency")
-    return {"frequency": frequency, "owners": _names(table["muscle"])}
+    frequency = bag.cut(topic, table, bag.names(topic, table, "unit"), "stimulation_frequency")
+    return {"frequency": frequency, "owners": bag.names(topic, table, "muscle")}
 
 
 def _read_muscles(bag: _Bag) -> dict[str, Any]:
@@ -302,7 +306,7 @@ def _read_muscles(bag: _Bag) -> dict[str, Any]:
     if not bag.has(topic):
         return {}
     table = bag.table(topic)
-    names = _names(table["name"])
+    names = bag.names(topic, table)
     return {"muscles": {field: bag.cut(topic, table, names, field) for field in MUSCLE_FIELDS}}
 
 
@@ -310,13 +314,13 @@ def _read_joints(bag: _Bag) -> dict[str, Any]:
     series = {}
     if bag.has("joint_torque"):
         table = bag.table("joint_torque")
-        series["torque"] = bag.cut("joint_torque", table, _names(table["joint"]), "torque")
+        series["torque"] = bag.cut("joint_torque", table, bag.names("joint_torque", table, "joint"), "torque")
     if bag.has("joint_states"):
         table = bag.table("joint_states")
-        names = _names(table["name"])
+        names = bag.names("joint_states", table)
         series["angle"] = bag.cut("joint_states", table, names, "position")
         # JointState may leave velocities out.
-        if table["velocity"].shape[1:] == (len(names),):
+        if bag.field("joint_states", table, "velocity").shape[1:] == (len(names),):
             series["velocity"] = bag.cut("joint_states", table, names, "velocity")
     return series
 
@@ -330,7 +334,7 @@ def _read_recorded(path: str | Path, start: float | None, end: float | None) -> 
         bag = _Bag(reader, "", start, end)
         bag.offset = float(reader.table(f"{bag.prefix}/{ANGLE_TOPIC}")["time"][0])
         table = bag.table(ANGLE_TOPIC)
-        return bag.cut(ANGLE_TOPIC, table, _names(table["name"]), "position")
+        return bag.cut(ANGLE_TOPIC, table, bag.names(ANGLE_TOPIC, table), "position")
 
 
 def _matched(angles: Series, joints: tuple[str, ...], given: str | Path | None, notes: list[str]) -> Series | None:
