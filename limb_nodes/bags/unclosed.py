@@ -11,6 +11,9 @@ from mcap.stream_reader import StreamReader
 
 from limb_nodes.errors import UserError
 
+# What stands between the name of a bag and the number of one of its parts.
+PART = ".part"
+
 
 class Stored(NamedTuple):
     """A message of a bag: topic, type, time (ns), and itself in CDR."""
@@ -21,8 +24,22 @@ class Stored(NamedTuple):
     data: bytes
 
 
+def parts_of(bag: str | Path) -> list[Path]:
+    """The folders of what recorders wrote that went on with a bag whose recorder was killed, in their order."""
+    path = Path(bag)
+    found = {folder: folder.name.removeprefix(f"{path.name}{PART}") for folder in path.parent.glob(f"*{PART}*")}
+    return sorted((folder for folder, number in found.items() if number.isdigit()), key=lambda one: int(found[one]))
+
+
+def new_part(bag: str | Path) -> Path:
+    """The folder of the next part of a bag."""
+    path, parts = Path(bag), parts_of(bag)
+    last = int(parts[-1].name.rpartition(PART)[2]) if parts else 0
+    return path.with_name(f"{path.name}{PART}{last + 1}")
+
+
 def stored(bag: str | Path) -> Iterator[Stored]:
-    """Every message up to the end, or to the first damage.
+    """Every message of a bag and then of its parts, of each up to its end or to the first damage.
 
     Raises UserError if there is no such bag, or no MCAP file in it.
     """
@@ -32,7 +49,7 @@ def stored(bag: str | Path) -> Iterator[Stored]:
     files = [path] if path.is_file() else sorted(path.glob("*.mcap"))
     if not files:
         raise UserError(f"{path}: holds no .mcap file; the bag of a run is needed")
-    for file in files:
+    for file in (*files, *(file for part in parts_of(path) for file in sorted(part.glob("*.mcap")))):
         yield from _stored(file)
 
 

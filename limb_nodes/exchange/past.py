@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from limb_nodes.bags.types import RUN_INFO, limb_typestore
-from limb_nodes.bags.unclosed import Stored, stored
-from limb_nodes.errors import UserError
 from limb_nodes.exchange.outgoing import stamp_of
 from limb_nodes.exchange.stream import CHECKPOINT
 from limb_nodes.foundation.topics import SENDERS, STATES
-from limb_nodes.foundation.yaml_text import parse_yaml
 
 # Every how many ticks a topic has a message, if not at each.
 EVERY = {"muscle_checkpoint": CHECKPOINT, "limb_checkpoint": CHECKPOINT}
@@ -34,60 +30,6 @@ class Past:
     messages: dict[str, dict[int, bytes]] = field(default_factory=lambda: {topic: {} for topic in NEEDED})
     muscles: tuple[int, bytes] | None = None
     limb: tuple[int, bytes] | None = None
-
-
-@dataclass(frozen=True)
-class RecordedRun:
-    """A bag of a run, as far as it has been written. Its messages are read anew each time.
-
-    bag: the folder. info: what it holds on `run_info`. namespace: of its topics.
-    """
-
-    bag: str
-    info: dict[str, Any]
-    namespace: str
-
-    @classmethod
-    def read(cls, bag: str) -> RecordedRun:
-        """Raises UserError if it is no bag of a run."""
-        first = next(iter(stored(bag)), None)
-        if first is None or first.topic.rpartition("/")[2] != RUN_INFO:
-            raise UserError(f"{bag}: does not begin with run_info; a bag of limb run is needed")
-        text = limb_typestore().deserialize_cdr(first.data, first.type).data  # type: ignore[attr-defined]
-        info = parse_yaml(text, f"{bag}: run_info")
-        needed = {"limb": str, "period_ns": int, "parameters": dict}
-        if not isinstance(info, dict) or any(not isinstance(info.get(key), kind) for key, kind in needed.items()):
-            raise UserError(f"{bag}: run_info lacks {', '.join(needed)}; a bag of limb run is needed")
-        return cls(bag, info, first.topic.rpartition("/")[0])
-
-    @property
-    def every(self) -> dict[str, int]:
-        """Topic of the run -> every how many ticks it has a message."""
-        parameters = self.info["parameters"].get("muscle_stack", {})
-        return expected_topics(parameters if isinstance(parameters, dict) else {})
-
-    def messages(self) -> Iterator[Stored]:
-        """What is recorded, topics without the namespace if they are in it."""
-        for message in stored(self.bag):
-            yield message._replace(topic=message.topic.removeprefix(f"{self.namespace}/"))
-
-    def past(self) -> Past:
-        """What the nodes need to go on."""
-        return past_of(((m.topic, m.data) for m in self.messages()), self.every, self.info["period_ns"])
-
-    def up_to(self, tick: int) -> Iterator[Stored]:
-        """What is recorded up to a tick, but for what a recorder says itself."""
-        nanoseconds, every = self.info["period_ns"], self.every
-        counts = dict.fromkeys(every, 0)
-        for message in self.messages():
-            at = message.time // nanoseconds
-            if at > tick or message.topic in (RUN_INFO, "robot_description"):
-                continue
-            if message.topic in every:
-                if at != counts[message.topic] * every[message.topic]:
-                    continue
-                counts[message.topic] += 1
-            yield message
 
 
 def expected_topics(parameters: Mapping[str, Any]) -> dict[str, int]:

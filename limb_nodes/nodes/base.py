@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import os
 import time
@@ -19,15 +20,24 @@ from std_msgs.msg import Header
 from limb_nodes.errors import RunError, UserError
 from limb_nodes.exchange.identity import FORM, is_identity
 from limb_nodes.exchange.part import Part
-from limb_nodes.exchange.past import RecordedRun
+from limb_nodes.exchange.recorded import RecordedRun
 from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.exchange.watch import LOOK_PERIOD, STALL, STALL_LIMIT, Watch
 from limb_nodes.model import Limb, load_limb
-from limb_nodes.nodes.distribution import given_parameters
+from limb_nodes.nodes.distribution import given_parameters, parameter_values
 from limb_nodes.nodes.messages import class_of
 from limb_nodes.nodes.qos import LIVE, STREAM
 
 MODES = ("lockstep", "realtime")
+# What the nodes of a limb declare, all together: a file of parameters may be for all of them.
+PARAMETERS = {
+    "allow_laws", "await_recorder", "band", "band_order", "channels", "command", "copies", "duration", "emg_rate",
+    "identity", "limb", "low_pass", "low_pass_order", "mains", "maximum", "mode", "on_silence", "out",
+    "publish_motor_unit_state", "publish_muscle_state", "publish_sarcomere_state", "rate", "resume", "silence",
+    "source", "stall_limit", "state_every",
+}  # fmt: skip
+# How the names of parameters begin that any node of ROS takes.
+ROS_PARAMETERS = ("use_sim_time", "qos_overrides.", "start_type_description_service")
 # The variable by which a run tells the nodes in processes of their own whose children they are: they end with it.
 PARENT = "LIMB_RUN_PARENT"
 # How long a node that a person has started waits for the others without a word (s).
@@ -78,7 +88,11 @@ class LimbNode(Node):
         return {"limb": self.limb, "ticks": self.ticks, "identity": self.given_identity, "realtime": realtime}
 
     def carry(self, part: Part, listen: bool = True) -> None:
-        """Publish what a part sends, and watch over it; listen: hand it what it takes, too."""
+        """Publish what a part sends, and watch over it; listen: hand it what it takes, too.
+
+        Comes after all parameters are declared. Raises UserError if others are given.
+        """
+        self.refuse_unknown()
         self.part = part
         part.complain = self.complain
         if self.resume:
@@ -92,6 +106,14 @@ class LimbNode(Node):
 
             self.listen(class_of(topic), topic, receive, STREAM, raw=True)
         self.create_timer(LOOK_PERIOD, self.on_look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def refuse_unknown(self) -> None:
+        """Raise UserError for a parameter that no node of a limb has."""
+        for name in given_parameters(self):
+            if not self.has_parameter(name) and name not in PARAMETERS and not name.startswith(ROS_PARAMETERS):
+                near = difflib.get_close_matches(name, parameter_values(self), 1)
+                meant = f"; {near[0]} is meant perhaps" if near else ""
+                raise UserError(f"{self.get_name()}: {name} is no parameter of this node{meant}")
 
     def recorded_run(self) -> RecordedRun:
         """The run that the node goes on with. Raises UserError if it is of another limb or rate."""

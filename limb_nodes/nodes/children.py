@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from limb_nodes.bags.unclosed import new_part
 from limb_nodes.errors import RunError, UserError
 from limb_nodes.foundation.topics import NODES
 from limb_nodes.nodes.base import PARENT
@@ -67,21 +68,17 @@ class Crew:
             self.children[name].raise_failure()
 
     def _revive(self, name: str) -> Child:
-        """The node anew, which goes on from the bag that is complete.
-
-        That is the one of the run once something is in it; a recorder makes that anew of the one that was cut short,
-        which it removes only when all of it is copied.
-        """
-        bag, given = Path(self._settings.out), self._settings.resume
-        short = bag.with_name(f"{bag.name}.killed")
-        if name == "recorder" and bag.exists():
-            if short.exists() or self._recorded() < 0:
-                shutil.rmtree(bag)
-            else:
-                bag.rename(short)
-        whole = short if short.exists() else bag if self._recorded() >= 0 else Path(given) if given else None
-        settings = replace(self._settings, resume=str(whole or ""))
-        return Child(settings, name, replaces=whole == short)
+        """The node anew, which goes on from the bag of the run once something is in it."""
+        settings = self._settings
+        out = Path(settings.out)
+        if self._recorded() >= 0:
+            settings = replace(settings, resume=settings.out)
+            if name == "recorder":
+                return Child(replace(settings, out=str(new_part(out))), name, copies=False)
+        elif name == "recorder" and out.exists():
+            # In it is at most a copy that was cut short.
+            shutil.rmtree(out)
+        return Child(settings, name)
 
     def stop(self) -> None:
         """End all nodes, the recorder last."""
@@ -93,14 +90,14 @@ class Crew:
 class Child:
     """A node in a process of its own. What it says goes on to standard error; its errors are kept."""
 
-    def __init__(self, settings: RunSettings, name: str, replaces: bool = False) -> None:
-        """replaces: whether a recorder removes the bag that it goes on with."""
+    def __init__(self, settings: RunSettings, name: str, copies: bool = True) -> None:
+        """copies: whether a recorder copies the bag that it goes on with into its own."""
         self.name = name
         self.said: deque[str] = deque(maxlen=20)
         arguments = ["--ros-args"]
         if settings.namespace:
             arguments += ["-r", f"__ns:=/{settings.namespace.removeprefix('/')}"]
-        own = {"replaces": True} if replaces and name == "recorder" else {}
+        own = {} if copies else {"copies": False}
         for key, value in {**settings.parameters(name), **own}.items():
             text = str(value).lower() if isinstance(value, bool) else value
             # Quoted, so that a text such as 'yes' or '1' stays a text.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
@@ -27,6 +26,7 @@ from limb_nodes.bags.versions import versions
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
 from limb_nodes.exchange.identity import is_identity
+from limb_nodes.exchange.recorded import copy
 from limb_nodes.exchange.recording import RecordingPart
 from limb_nodes.exchange.stream import RECORDER_LAG
 from limb_nodes.foundation.topics import LATCHED_TOPICS, NODES, SENDERS, TOPIC_TYPES
@@ -63,7 +63,7 @@ class Recorder(LimbNode):
         super().__init__("recorder", **options)
         out = self.text("out", "", "folder of the bag, which must not exist")
         self.command = self.text("command", "", "the command that started the run, for the record")
-        self.replaces = self.switch("replaces", False, "remove the bag of resume when it is copied into the new one")
+        self.copies = self.switch("copies", True, "copy the bag of resume into the new one")
         if not out:
             raise UserError("recorder: the parameter out is empty; the folder of a new bag is needed")
         self.path = out
@@ -165,18 +165,9 @@ class Recorder(LimbNode):
         self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.part.expected, *reports)})
         if self.description is not None:
             self.write("robot_description", 0, String(data=self.description))
-        if self.resume:
-            self.copy_past()
+        if self.resume and self.copies:
+            copy(self.recorded_run().up_to(self.part.complete), self.writer)
         self.announce()
-
-    def copy_past(self) -> None:
-        """Write what has been recorded before."""
-        assert self.writer is not None
-        for message in self.recorded_run().up_to(self.part.complete):
-            self.writer.write_raw(message.topic, message.time, message.data, message.type)
-        if self.replaces:
-            self.writer.flush().result()
-            shutil.rmtree(self.resume)
 
     def write(self, topic: str, stamp: int, message: Any) -> None:
         """Write a message of rclpy."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from limb_nodes.errors import FieldError, UserError
 from limb_nodes.exchange.identity import is_identity
-from limb_nodes.exchange.past import RecordedRun
+from limb_nodes.exchange.recorded import RecordedRun
 from limb_nodes.foundation.topics import NODES, STATES
 from limb_nodes.nodes.settings import RunSettings
 

@@ -19,6 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
 from limb_nodes.errors import FieldError, RunError, UserError
+from limb_nodes.exchange.recorded import join_parts
 from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.exchange.watch import Watch
 from limb_nodes.foundation.topics import NODES
@@ -118,17 +119,19 @@ def run_in_processes(settings: RunSettings, progress: Progress) -> Outcome:
     executor = make_executor(context)
     crew = Crew(settings, lambda: observer.recorded)
     try:
-        refuse_neighbours(context, settings.namespace)
-        executor.add_node(observer)
-        crew.start()
-        seconds = await_the_end(executor, observer, crew, interrupt, progress)
-        crew.stop()
+        try:
+            refuse_neighbours(context, settings.namespace)
+            executor.add_node(observer)
+            crew.start()
+            seconds = await_the_end(executor, observer, crew, interrupt, progress)
+        finally:
+            crew.stop()
+            join_parts(settings.out)
         if interrupt.wanted and not Path(settings.out).exists():
             return Outcome(0, 0, 0, 0, 0, 0, 0.0, True)
         crew["recorder"].raise_failure()
         return recorded_outcome(settings, seconds, interrupt.wanted)
     finally:
-        crew.stop()
         close(context, executor, [observer])
 
 
