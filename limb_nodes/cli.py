@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import os
 import pkgutil
+import re
 import sys
 from collections.abc import Sequence
 
 from limb_nodes import __version__, commands
-from limb_nodes.errors import FieldError, UserError
+from limb_nodes.edge import guarded
+from limb_nodes.errors import MOST, FieldError, UserError, clean, shortened, shown
 
 
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """End with status 2 and one line."""
-        self.exit(2, f"limb: error: {message} (see {self.prog} --help)\n")
+        """Raise UserError."""
+        raise UserError(f"{shown(message, 300)} (see {self.prog} --help)")
 
 
 def parser(names: Sequence[str]) -> argparse.ArgumentParser:
@@ -43,22 +44,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # A command that is named first needs no other command's modules.
     names = [given[0]] if given and given[0] in known else known
     options: dict[str, str] = {}
-    try:
+
+    def work() -> int:
         parsed = parser(names).parse_args(given)
-        options = parsed.options
+        options.update(parsed.options)
         module = importlib.import_module(f"limb_nodes.commands.{parsed.command}")
         return int(module.run(parsed))
-    except UserError as error:
-        line = error.line(options.get(error.field, error.field)) if isinstance(error, FieldError) else str(error)
-        print(f"limb: error: {line}", file=sys.stderr)
-        return error.status
-    except KeyboardInterrupt:
-        print("limb: interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        # The reader of a pipe has gone, as in `limb ... | head`.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+
+    def line(error: UserError) -> str:
+        text = error.raw(options.get(error.field, "") if isinstance(error, FieldError) else "")
+        parts = {part for argument in given for part in (argument, *re.split("[=,]", argument)) if len(part) > MOST}
+        for part in sorted(parts, key=len, reverse=True):
+            text = text.replace(part, shortened(part))
+        return clean(text)
+
+    return guarded(work, line)
 
 
 if __name__ == "__main__":

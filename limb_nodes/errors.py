@@ -33,11 +33,19 @@ def _shortened(text: str, most: int) -> str:
     return f"{text[:head]}...{text[head + 3 - most :]}"
 
 
-def _short_path(word: str) -> str:
-    """A long word; if it is a path, its names are shortened one by one."""
-    if "/" not in word:
-        return _shortened(word, MOST)
-    return _shortened("/".join(_shortened(name, MOST) for name in word.split("/")), MOST_PATH)
+def shortened(text: str) -> str:
+    """A text of the user with its middle left out; the names of a path are shortened one by one."""
+    if "/" not in text:
+        return _shortened(text, MOST)
+    return _shortened("/".join(_shortened(name, MOST) for name in text.split("/")), MOST_PATH)
+
+
+def clean(line: str) -> str:
+    """A line without control characters, long words and quoted texts shortened in the middle."""
+    line = escaped(_BREAK.sub(" ", line))
+    line = _LONG_QUOTE.sub(lambda found: shortened(found.group()), line)
+    line = _LONG_WORD.sub(lambda found: shortened(found.group()), line)
+    return _shortened(line, MOST_LINE)
 
 
 class UserError(Exception):
@@ -49,16 +57,12 @@ class UserError(Exception):
 
     status = 2
 
-    def __str__(self) -> str:
-        return self.clean(super().__str__())
+    def raw(self, name: str = "") -> str:
+        """The line, whatever is in it. name: what to call a field, if there is one and it has another name."""
+        return super().__str__()
 
-    @staticmethod
-    def clean(line: str) -> str:
-        """A line without control characters, long words and quoted texts shortened in the middle."""
-        line = escaped(_BREAK.sub(" ", line))
-        line = _LONG_QUOTE.sub(lambda found: _short_path(found.group()), line)
-        line = _LONG_WORD.sub(lambda found: _short_path(found.group()), line)
-        return _shortened(line, MOST_LINE)
+    def __str__(self) -> str:
+        return clean(self.raw())
 
 
 class RunError(UserError):
@@ -86,9 +90,7 @@ class FieldError(UserError):
         self._problem = problem
         self._source = source
 
-    def line(self, name: str) -> str:
-        """The line that the user sees, with another name of the field."""
-        return self.clean(f"{self._source}: {name} {self._problem}" if self._source else f"{name} {self._problem}")
-
-    def __str__(self) -> str:
-        return self.line(self.field)
+    def raw(self, name: str = "") -> str:
+        """The line, whatever is in it. name: what to call the field, if it has another name."""
+        line = f"{name or self.field} {self._problem}"
+        return f"{self._source}: {line}" if self._source else line

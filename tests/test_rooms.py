@@ -22,9 +22,10 @@ BELOW: dict[str, set[str]] = {
     "signals": {"foundation", "bags"},
     "analysis": SCIENCE,
     "exchange": SCIENCE,
-    "nodes": {*SCIENCE, "exchange"},
+    "nodes": {*SCIENCE, "exchange", "edge"},
     "commands": {*SCIENCE, "analysis", "exchange", "nodes"},
-    "cli": {"commands"},
+    "edge": set(),
+    "cli": {"commands", "edge"},
 }
 WITH_ROS = {"nodes"}
 

@@ -101,7 +101,7 @@ class ActivationInput(LimbNode):
         try:
             return LiveSource(self, reader(self.muscles, settings), settings.silence, len(self.muscles))
         except FieldError as error:
-            raise UserError(f"activation_input: {error.line(f'the parameter {error.field}')}") from None
+            raise UserError(f"activation_input: {error.raw(f'the parameter {error.field}')}") from None
 
     def values_at(self, tick: int) -> FloatArray:
         """The activations [muscles] of a tick: of a live source those that it gives now."""

@@ -13,13 +13,12 @@ from limb_msgs.msg import MuscleActivation
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.signals import SignalHandlerOptions
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.errors import FieldError, UserError
 from limb_nodes.foundation.parameter import Parameter
 from limb_nodes.nodes.qos import EVERY
-from limb_nodes.nodes.running import Interrupt, acknowledged, check_namespace
+from limb_nodes.nodes.running import Interrupt, acknowledged, check_namespace, init_ros
 
 TOPIC = "emg_envelope"
 TYPE = "limb_msgs/msg/MuscleActivation"
@@ -90,7 +89,7 @@ def play(
     check_namespace(namespace)
     interrupt = Interrupt()
     context = Context()
-    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    init_ros(context)
     node = None
     try:
         node = Node("play", context=context, namespace=namespace or None, start_parameter_services=False)

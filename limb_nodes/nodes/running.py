@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import rclpy
@@ -20,6 +22,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_namespace import validate_namespace
 
+from limb_nodes.edge import guarded
 from limb_nodes.errors import FieldError, UserError
 from limb_nodes.nodes.base import PARENT
 from limb_nodes.nodes.distribution import make_executor
@@ -28,6 +31,8 @@ from limb_nodes.nodes.distribution import make_executor
 SPIN_TIMEOUT = 0.05
 # The signals by which a run is ended in order; the last comes when a terminal is closed.
 ENDING = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+# Ports are numbered by the domain; there are none beyond.
+HIGHEST_DOMAIN = 232
 
 
 def spin(executor: Executor, done: Callable[[], bool]) -> None:
@@ -73,11 +78,16 @@ def main_of(node_class: Callable[..., Node]) -> Callable[[Sequence[str] | None],
 
 def run_node(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
     """Run one node until it has finished or is interrupted; its exit status."""
+    return guarded(lambda: run_guarded(node_class, args))
+
+
+def run_guarded(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
+    """The same; raises UserError and whatever else goes wrong."""
     interrupt = Interrupt()
     context = Context()
     node, executor = None, None
     try:
-        rclpy.init(args=args, context=context, signal_handler_options=SignalHandlerOptions.NO)
+        init_ros(context, args)
         node = node_class(context=context)
         executor = make_executor(context)
         executor.add_node(node)
@@ -91,13 +101,32 @@ def run_node(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
         if not interrupt.wanted:
             linger(executor, node, interrupt)
         return 0
-    except UserError as error:
-        print(f"limb: error: {error}", file=sys.stderr)
-        return error.status
-    except KeyboardInterrupt:
-        return 0
     finally:
         close(context, executor, [node] if node is not None else [])
+
+
+def init_ros(context: Context, args: Sequence[str] | None = None) -> None:
+    """Begin to use ROS, without files of logs if there is no folder for them.
+
+    Raises FieldError, and an error of rclpy for arguments that it does not take.
+    """
+    domain = os.environ.get("ROS_DOMAIN_ID", "")
+    # With a greater one the middleware ends the process.
+    if domain and not (re.fullmatch("[0-9]{1,9}", domain) and int(domain) <= HIGHEST_DOMAIN):
+        raise FieldError("ROS_DOMAIN_ID", f"is {domain!r}; a whole number from 0 to {HIGHEST_DOMAIN} is needed")
+    given = list(sys.argv if args is None else args)
+    if not logs_can_be_kept():
+        given += ["--ros-args", "--disable-external-lib-logs"]
+    rclpy.init(args=given, context=context, signal_handler_options=SignalHandlerOptions.NO)
+
+
+def logs_can_be_kept() -> bool:
+    """Whether ROS can write its logs, where it would do so."""
+    home = os.environ.get("ROS_HOME") or "~/.ros"
+    folder = Path(os.environ.get("ROS_LOG_DIR") or f"{home}/log").expanduser()
+    with suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+    return os.access(folder, os.W_OK | os.X_OK) and bool(os.environ.get("HOME") or os.environ.get("ROS_LOG_DIR"))
 
 
 def close(context: Context, executor: Executor | None, nodes: Iterable[Node]) -> None:

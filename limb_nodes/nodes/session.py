@@ -15,7 +15,6 @@ from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 
 from limb_nodes.errors import FieldError, RunError, UserError
@@ -31,7 +30,7 @@ from limb_nodes.nodes.messages import tick_of
 from limb_nodes.nodes.muscle_stack import MuscleStack
 from limb_nodes.nodes.qos import STREAM
 from limb_nodes.nodes.recorder import Recorder
-from limb_nodes.nodes.running import Interrupt, close
+from limb_nodes.nodes.running import Interrupt, close, init_ros
 from limb_nodes.nodes.settings import Outcome, Progress, RunSettings, recorded_outcome
 
 CLASSES = {
@@ -54,7 +53,7 @@ def run_in_one_process(settings: RunSettings, progress: Progress) -> Outcome:
     """Run the nodes in this process. `progress` is called with the newest recorded tick. Raises UserError."""
     interrupt = Interrupt()
     context = Context()
-    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    init_ros(context)
     executor = make_executor(context)
     nodes: dict[str, Any] = {}
     try:
@@ -114,7 +113,7 @@ def run_in_processes(settings: RunSettings, progress: Progress) -> Outcome:
     """Run each node in a process of its own. `progress` is called with the newest recorded tick. Raises UserError."""
     interrupt = Interrupt()
     context = Context()
-    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    init_ros(context)
     observer = Observer(settings, context)
     executor = make_executor(context)
     crew = Crew(settings, lambda: observer.recorded)
