@@ -14,12 +14,18 @@ from limb_nodes.edge import guarded
 from limb_nodes.errors import MOST, FieldError, UserError, clean, shortened, shown
 
 
+# How argparse begins to list what it does not know.
+UNKNOWN = "unrecognized arguments: "
+
+
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
         """Raise UserError."""
-        raise UserError(f"{shown(message, 300)} (see {self.prog} --help)")
+        if message.startswith(UNKNOWN):
+            message = shown(message, len(UNKNOWN) + MOST)
+        raise UserError(f"{message} (see {self.prog} --help)")
 
 
 def parser(names: Sequence[str]) -> argparse.ArgumentParser:

@@ -33,13 +33,14 @@ _SHORT_WORDS = re.compile("cannot allocate memory|start new thread|failed to map
 _ROS_PLACE = re.compile(r",? at /\S+:\d+")
 
 
-def check_limits() -> None:
-    """Raise UserError if the system gives too little memory: OpenBLAS would wait for more while it is loaded."""
+def check_limits() -> int:
+    """Return 0; raise UserError if the system gives too little memory: OpenBLAS would wait for more while it is loaded."""
     needed = _MEMORY + _MEMORY_OF_PROCESSOR * (os.cpu_count() or 1)
     for name, kind in (("ulimit -v", resource.RLIMIT_AS), ("ulimit -d", resource.RLIMIT_DATA)):
         limit = resource.getrlimit(kind)[0]
         if limit != resource.RLIM_INFINITY and limit < needed:
             raise UserError(f"{name} is {limit // 1024}; unlimited, or at least {needed // 1024} in kB, is needed")
+    return 0
 
 
 def guarded(work: Callable[[], int], line: Callable[[UserError], str] = str) -> int:
@@ -58,7 +59,7 @@ def guarded(work: Callable[[], int], line: Callable[[UserError], str] = str) -> 
     try:
         with redirect_stdout(_Printable(sys.stdout)), redirect_stderr(_Forgiving(sys.stderr)):
             try:
-                status = _status_of(work, line)
+                status = _status_of(check_limits, line) or _status_of(work, line)
             finally:
                 # What waits until Python itself ends could be told by Python alone.
                 written = _status_of(_flushed, str)
@@ -69,7 +70,6 @@ def guarded(work: Callable[[], int], line: Callable[[UserError], str] = str) -> 
 
 def _status_of(work: Callable[[], int], line: Callable[[UserError], str]) -> int:
     try:
-        check_limits()
         return work()
     except UserError as error:
         return _say(line(error), error.status)

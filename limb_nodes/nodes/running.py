@@ -23,7 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_namespace import validate_namespace
 
 from limb_nodes.edge import guarded
-from limb_nodes.errors import FieldError, UserError
+from limb_nodes.errors import FieldError
 from limb_nodes.nodes.base import PARENT
 from limb_nodes.nodes.distribution import make_executor
 
@@ -123,7 +123,7 @@ def init_ros(context: Context, args: Sequence[str] | None = None) -> None:
 def logs_can_be_kept() -> bool:
     """Whether ROS can write its logs, where it would do so."""
     home = os.environ.get("ROS_HOME") or "~/.ros"
-    folder = Path(os.environ.get("ROS_LOG_DIR") or f"{home}/log").expanduser()
+    folder = Path(os.path.expanduser(os.environ.get("ROS_LOG_DIR") or f"{home}/log"))
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
     return os.access(folder, os.W_OK | os.X_OK) and bool(os.environ.get("HOME") or os.environ.get("ROS_LOG_DIR"))
