@@ -13,7 +13,6 @@ from limb_nodes import __version__, commands
 from limb_nodes.edge import guarded
 from limb_nodes.errors import MOST, FieldError, UserError, clean, shortened, shown
 
-
 # How argparse begins to list what it does not know.
 UNKNOWN = "unrecognized arguments: "
 

@@ -14,7 +14,7 @@ from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
-from limb_nodes.errors import RunError, UserError, clean, escaped
+from limb_nodes.errors import RunError, UserError, clean, escaped, shortened, shown
 
 # The variable that shows tracebacks.
 DEBUG = "LIMB_DEBUG"
@@ -34,7 +34,7 @@ _ROS_PLACE = re.compile(r",? at /\S+:\d+")
 
 
 def check_limits() -> int:
-    """Return 0; raise UserError if the system gives too little memory: OpenBLAS would wait for more while it is loaded."""
+    """Return 0. Raises UserError if the system gives so little memory that OpenBLAS would wait for more for ever."""
     needed = _MEMORY + _MEMORY_OF_PROCESSOR * (os.cpu_count() or 1)
     for name, kind in (("ulimit -v", resource.RLIMIT_AS), ("ulimit -d", resource.RLIMIT_DATA)):
         limit = resource.getrlimit(kind)[0]
@@ -98,10 +98,10 @@ def told(error: BaseException) -> tuple[str, int]:
     if isinstance(error, MemoryError) or getattr(error, "errno", None) in _SHORT or _SHORT_WORDS.search(text):
         return f"{text}; {_NEEDED}", 1
     if isinstance(error, OSError):
-        name = "" if error.filename is None else f"{os.fsdecode(error.filename)}: "
+        name = "" if error.filename is None else f"{shortened(os.fsdecode(error.filename))}: "
         return f"{name}{error.strerror or text}", 1 if error.errno in _FULL else 2
     if isinstance(error, UnicodeError):
-        return f"{getattr(error, 'object', text)!r} cannot be written as UTF-8; a text in UTF-8 is needed", 2
+        return f"{shown(repr(getattr(error, 'object', text)))} cannot be written as UTF-8; a text in UTF-8 is needed", 2
     if isinstance(error, ImportError):
         return f"{text}; a complete installation is needed", 2
     if type(error).__module__.split(".")[0] == "rclpy":

@@ -213,6 +213,7 @@ class LimbNode(Node):
             level=DiagnosticStatus.WARN if bad else DiagnosticStatus.OK,
             name=self.get_fully_qualified_name(),
             message=message,
+            hardware_id=self.given_identity,
             values=[KeyValue(key=key, value=str(value)) for key, value in {**values, **counts}.items()],
         )
         stamp = self.get_clock().now().to_msg()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -148,12 +149,15 @@ def reported(bag: BagReader, settings: RunSettings) -> dict[str, Any]:
     live, lost = ("nothing is known of the live source", True) if not settings.source else ("", False)
     names = {f"/{settings.namespace.strip('/')}/{node}".replace("//", "/"): node for node in NODES}
     messages = bag.read_topic("/diagnostics") if bag.has("/diagnostics") else ()
-    for status in (status for _, message in messages for status in message.status if status.name in names):
+    for status in (status for _, message in messages for status in message.status):
+        if status.name not in names or status.hardware_id != settings.identity:
+            continue  # anybody may write on this topic
         values = {pair.key: pair.value for pair in status.values}
         node = names[status.name]
         for key, of_node in counts.items():
-            of_node[node] = max(of_node[node], int(values.get(key, 0)))
+            told = values.get(key, "0")
+            of_node[node] = max(of_node[node], int(told) if re.fullmatch("[0-9]{1,18}", told) else 0)
         if "input" in values:
             live, lost = status.message, values["input"] != HEARD
-    told = {key: sum(of_node.values()) for key, of_node in counts.items()}
-    return {"missed": told.pop("missed_deadlines"), **told, "live": live, "lost": lost}
+    sums = {key: sum(of_node.values()) for key, of_node in counts.items()}
+    return {"missed": sums.pop("missed_deadlines"), **sums, "live": live, "lost": lost}
