@@ -96,7 +96,8 @@ def summary_text(record: BenchRecord) -> str:
         rows.append((row.name, row.unit, first, lowest, highest, last))
     peak = int(record.force.argmax())
     end = f"highest force {record.force[peak]:.5g} N at {record.time[peak]:.4g} s; work {record.work:.5g} J"
-    return "\n".join([*aligned(rows, "lrrrrr"), end])
+    left = [f"range: {length} {told}" for length, told in record.ranges.told().items()]
+    return "\n".join([*aligned(rows, "lrrrrr"), end, *left])
 
 
 def summary_data(record: BenchRecord) -> dict[str, Any]:
@@ -104,6 +105,7 @@ def summary_data(record: BenchRecord) -> dict[str, Any]:
     return {
         "duration": float(record.time[-1] - record.time[0]),
         "work": record.work,
+        "out_of_range": record.ranges.told(),
         "highest_force_at": float(record.time[int(record.force.argmax())]),
         "excitation": extent(record.excitation),
         "muscle": {name: extent(record.muscle[name]) for name in MUSCLE_UNITS},

@@ -11,15 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limb_nodes.bags.bulk import write_table
+from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.foundation.topics import LATCHED_TOPICS, TOPIC_TYPES
 from limb_nodes.model import Limb
 from limb_nodes.model.points import point_names, points
 from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, UNIT_FIELDS
+from limb_nodes.solve.ranges import LEFT, OUT_OF_RANGE, Ranges
 from limb_nodes.solve.whole import Movement
 
 # Bytes that wait for the writer while the solve goes on.
 MOST_WAITING = 2**22
+# Level of a report that something is not as it should be.
+WARN = 1
 
 
 class Topic(NamedTuple):
@@ -33,12 +37,15 @@ class Topic(NamedTuple):
 class MovementBag:
     """A bag that is being written of the parts of a movement; a context manager, as `BagWriter`, and closed likewise.
 
-    count: of all instants of the movement. rate: of the instants, Hz.
+    count: of all instants of the movement. rate: of the instants, Hz. ranges: looks at the parts; what it has seen
+    when the bag is closed is told on `/diagnostics`, as in a run.
     Raises UserError if the folder exists or cannot be made.
     """
 
-    def __init__(self, path: str | Path, limb: Limb, count: int, rate: float, run_info: Mapping[str, Any]) -> None:
-        self._limb, self._count, self._period = limb, count, round(1e9 / rate)
+    def __init__(
+        self, path: str | Path, limb: Limb, count: int, rate: float, run_info: Mapping[str, Any], ranges: Ranges
+    ) -> None:
+        self._limb, self._count, self._period, self._ranges = limb, count, round(1e9 / rate), ranges
         self._done = 0
         self._writer = BagWriter(path, run_info, latched=LATCHED_TOPICS, most_waiting=MOST_WAITING)
 
@@ -59,7 +66,22 @@ class MovementBag:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._tell_ranges()
         self._writer.__exit__(kind, error, trace)
+
+    def _tell_ranges(self) -> None:
+        """Write which lengths of muscles have left their range, if any."""
+        if not (told := self._ranges.told()):
+            return
+        values = [
+            make_message("diagnostic_msgs/msg/KeyValue", key=OUT_OF_RANGE + length, value=words)
+            for length, words in told.items()
+        ]
+        status = make_message(
+            "diagnostic_msgs/msg/DiagnosticStatus", level=WARN, name="limb_simulate", message=LEFT, values=values
+        )
+        now = max(0, self._done - 1) * self._period
+        self._writer.write("/diagnostics", now, make_message(TOPIC_TYPES["/diagnostics"], now, status=[status]))
 
 
 def movement_topics(limb: Limb, movement: Movement, tick: NDArray[np.uint64], last_tick: int) -> list[Topic]:

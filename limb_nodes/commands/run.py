@@ -145,6 +145,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"strangers  {outcome.foreign} messages of others kept out")
     if outcome.conflicts:
         print(f"doubtful   {outcome.conflicts} ticks came twice with different values: another publishes for this run")
+    for length, told in outcome.ranges.items():
+        print(f"range      {length} {told}")
     if outcome.live:
         print(f"live input {outcome.live}")
     print(f"wall time  {outcome.seconds:.2f} s ({seconds / max(outcome.seconds, 1e-9):.3g} simulated s per s)")

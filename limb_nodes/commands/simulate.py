@@ -18,6 +18,7 @@ from limb_nodes.foundation.text_table import aligned
 
 if TYPE_CHECKING:
     from limb_nodes.analysis.record import MovementBag
+    from limb_nodes.solve.ranges import Ranges
     from limb_nodes.solve.whole import Movement
 
 
@@ -56,10 +57,12 @@ def run(args: argparse.Namespace) -> int:
     activation = load_activation(args.source, limb.muscle_names, args.rate, args.duration)
 
     from limb_nodes.solve.failure import SolveError
+    from limb_nodes.solve.ranges import Ranges
     from limb_nodes.solve.whole import TOLERANCE, WholeModel
 
     tolerance = args.tolerance or TOLERANCE
     model = WholeModel(limb, once=True)
+    ranges = Ranges(model)
     bag: MovementBag | nullcontext[None] = nullcontext()
     if args.out:
         from limb_nodes.analysis.record import MovementBag
@@ -76,8 +79,8 @@ def run(args: argparse.Namespace) -> int:
             "versions": versions(),
             "seed": None,
         }
-        bag = MovementBag(args.out, limb, len(activation), args.rate, info)
-    summary, failure = Summary(limb.joint_names), None
+        bag = MovementBag(args.out, limb, len(activation), args.rate, info, ranges)
+    summary, failure = Summary(limb.joint_names, ranges), None
     try:
         with bag as recording:
             for part in summary.over(
@@ -99,10 +102,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 class Summary:
-    """What is told of a movement: how long it took to solve, and where its joints went."""
+    """What is told of a movement: how long it took to solve, where its joints went, what left its range."""
 
-    def __init__(self, joints: Sequence[str]) -> None:
-        self._joints = joints
+    def __init__(self, joints: Sequence[str], ranges: Ranges) -> None:
+        self._joints, self._ranges = joints, ranges
         self._seconds = self._end = 0.0
         self._steps = 0
         self._lowest = [math.inf] * len(joints)
@@ -118,6 +121,7 @@ class Summary:
             self._lowest = [min(pair) for pair in zip(self._lowest, part.angle.min(axis=0).tolist(), strict=True)]
             self._highest = [max(pair) for pair in zip(self._highest, part.angle.max(axis=0).tolist(), strict=True)]
             self._last = part.angle[-1].tolist()
+            self._ranges.look_at(part)
             yield part
             begun = time.perf_counter()
 
@@ -127,4 +131,6 @@ class Summary:
         for joint, *angles in zip(self._joints, self._lowest, self._highest, self._last, strict=True):
             lowest, highest, last = map(math.degrees, angles)
             rows.append((joint, f"{lowest:.3f}", f"{highest:.3f}", f"{last:.4f}", ""))
-        return [f"solved     {self._end:g} s in {self._seconds:.3g} s, {self._steps} steps", *aligned(rows, "lrrr")]
+        solved = f"solved     {self._end:g} s in {self._seconds:.3g} s, {self._steps} steps"
+        left = [f"range      {length} {told}" for length, told in self._ranges.told().items()]
+        return [solved, *aligned(rows, "lrrr"), *left]

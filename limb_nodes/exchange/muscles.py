@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -23,12 +24,14 @@ Input = tuple[FloatArray, FloatArray]
 class MusclePart(Part):
     """From activations and joint states to joint torques and the states of muscles.
 
-    tick: the newest that is answered. states: topics of states that are sent, every `state_every` ticks.
+    tick: the newest that is answered. states: topics of states that are sent, every `state_every` ticks. tell_ranges:
+    called when a length of a muscle leaves its range for the first time, and before the last answer.
     """
 
     def __init__(self, *given: Any, states: tuple[str, ...] = STATES, state_every: int = 1, **options: Any) -> None:
         super().__init__(*given, **options)
         self.state_every = state_every
+        self.tell_ranges: Callable[[], None] = lambda: None
         self.stepper = MuscleStepper(self.limb)
         n, muscles = len(self.limb.segments), len(self.limb.muscles)
         self.tick = self.last_tick = -1
@@ -99,6 +102,8 @@ class MusclePart(Part):
                 f"{self.limb.file}: {self.stepper.culprit(angle, velocity, excitation)} at {tick * self.ticks.period:g}"
                 f" s (tick {tick}), which is no number; a law that gives finite values there is needed"
             )
+        if self.stepper.look() or tick == self.last_tick:
+            self.tell_ranges()
         if self.states and tick % self.state_every == 0:
             self.stepper.observe(angle, velocity, excitation)
             for states, copies in self.states:

@@ -8,6 +8,7 @@ from limb_nodes.exchange.muscles import MusclePart
 from limb_nodes.foundation.topics import STATES
 from limb_nodes.nodes.base import LimbNode
 from limb_nodes.nodes.running import main_of
+from limb_nodes.solve.ranges import LEFT, OUT_OF_RANGE
 
 
 class MuscleStack(LimbNode):
@@ -24,6 +25,25 @@ class MuscleStack(LimbNode):
         every = self.whole("state_every", 1, "publish the states every so many ticks", 1, 1_000_000)
         states = [topic for topic in STATES if self.switch(f"publish_{topic}", True, f"whether to publish {topic}")]
         self.carry(MusclePart(**self.common, states=tuple(states), state_every=every))
+        self.told = -1
+        self.part.tell_ranges = self.tell_ranges
+
+    def tell_ranges(self) -> None:
+        """Say which lengths of muscles were out of their range, if any; on the log at first and at last."""
+        part, told = self.part, self.part.stepper.ranges.told()
+        if not told:
+            return
+        if self.told < 0 or part.tick == part.last_tick:
+            self.get_logger().warning("; ".join(f"{length} {words}" for length, words in told.items()))
+        self.told = part.tick
+        values = {OUT_OF_RANGE + length: words for length, words in told.items()}
+        self.diagnose(LEFT, bad=True, **values)
+
+    def destroy_node(self) -> None:
+        """Tell it at last, if the run ends before its last tick."""
+        if 0 <= self.told < self.part.tick:
+            self.tell_ranges()
+        super().destroy_node()
 
 
 main = main_of(MuscleStack)

@@ -76,6 +76,7 @@ def run_in_one_process(settings: RunSettings, progress: Progress) -> Outcome:
             interrupted=interrupt.wanted,
             live=live.told() if live else "",
             lost=bool(live and live.lost),
+            ranges=nodes["muscle_stack"].part.stepper.ranges.told(),
         )
     finally:
         close(context, executor, nodes.values())

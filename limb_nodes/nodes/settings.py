@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from limb_nodes.nodes.live_readers import reader
 from limb_nodes.nodes.live_settings import HEARD, LiveSettings
 from limb_nodes.nodes.running import check_namespace
 from limb_nodes.signals.activation import load_activation
+from limb_nodes.solve.ranges import OUT_OF_RANGE
 
 # Longest run (s).
 LONGEST = 1e9
@@ -83,7 +84,8 @@ class Outcome:
     """How a run went. ticks: on the topic joint_states; missing: ticks not in the bag, over all topics;
     missed: deadlines in real time; bad_input: messages that could not be used; foreign: messages of others; conflicts:
     ticks that came twice with different values; seconds: wall time. live: how a live source did, in words, empty
-    without one; lost: whether it never came, or was silent at the end.
+    without one; lost: whether it never came, or was silent at the end. ranges: by length, how far muscles were out
+    of their range, in words.
     """
 
     ticks: int
@@ -96,6 +98,7 @@ class Outcome:
     interrupted: bool
     live: str = ""
     lost: bool = False
+    ranges: Mapping[str, str] = field(default_factory=dict)
 
 
 def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
@@ -146,6 +149,7 @@ def recorded_outcome(settings: RunSettings, seconds: float, interrupted: bool) -
 def reported(bag: BagReader, settings: RunSettings) -> dict[str, Any]:
     """What the nodes have told on `/diagnostics`, as fields of an `Outcome`."""
     counts = {key: dict.fromkeys(NODES, 0) for key in ("missed_deadlines", "bad_input", "foreign", "conflicts")}
+    ranges: dict[str, str] = {}
     live, lost = ("nothing is known of the live source", True) if not settings.source else ("", False)
     names = {f"/{settings.namespace.strip('/')}/{node}".replace("//", "/"): node for node in NODES}
     messages = bag.read_topic("/diagnostics") if bag.has("/diagnostics") else ()
@@ -157,7 +161,8 @@ def reported(bag: BagReader, settings: RunSettings) -> dict[str, Any]:
         for key, of_node in counts.items():
             told = values.get(key, "0")
             of_node[node] = max(of_node[node], int(told) if re.fullmatch("[0-9]{1,18}", told) else 0)
+        ranges |= {k.removeprefix(OUT_OF_RANGE): text for k, text in values.items() if k.startswith(OUT_OF_RANGE)}
         if "input" in values:
             live, lost = status.message, values["input"] != HEARD
     sums = {key: sum(of_node.values()) for key, of_node in counts.items()}
-    return {"missed": sums.pop("missed_deadlines"), **sums, "live": live, "lost": lost}
+    return {"missed": sums.pop("missed_deadlines"), **sums, "live": live, "lost": lost, "ranges": ranges}

@@ -24,6 +24,7 @@ from limb_nodes.model.limb import Limb, Muscle, Segment
 from limb_nodes.solve.failure import SolveError
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import straight
+from limb_nodes.solve.ranges import Ranges
 from limb_nodes.solve.stepping import MuscleStepper
 from limb_nodes.solve.whole import WholeModel
 
@@ -88,7 +89,7 @@ class BenchRecord:
     time: s [T]. excitation: [T].
     muscle: by name of `MUSCLE_OUTPUTS` [T]. unit: by name of `UNIT_OUTPUTS` [T, units], named by
         `unit_names`, in the order of recruitment.
-    internal: internal states [T, states], named by `state_names`.
+    internal: internal states [T, states], named by `state_names`. ranges: has looked at all instants.
     """
 
     time: FloatArray
@@ -98,6 +99,7 @@ class BenchRecord:
     unit_names: tuple[str, ...]
     internal: FloatArray
     state_names: tuple[str, ...]
+    ranges: Ranges
 
     @property
     def force(self) -> FloatArray:
@@ -334,9 +336,11 @@ class MuscleBench:
         layout = self.model.layout
         muscle = np.zeros((len(time), 1, len(MUSCLE_OUTPUTS)))
         unit = np.zeros((len(time), layout.units, len(UNIT_OUTPUTS)))
-        data = self.model.new_data(1.0)
+        data, ranges = self.model.new_data(1.0), Ranges(self.model)
+        states = np.ascontiguousarray(np.column_stack([length, rate, internal]))
+        ranges.look(states)
         self.model.program.observe_all(
-            np.ascontiguousarray(np.column_stack([length, rate, internal])),
+            states,
             np.ascontiguousarray(excitation[:, np.newaxis]),
             layout.model.address,
             data.address,
@@ -351,4 +355,5 @@ class MuscleBench:
             unit_names=self.unit_names,
             internal=internal,
             state_names=self.state_names,
+            ranges=ranges,
         )

@@ -23,7 +23,7 @@ from limb_nodes.model.kinds import MuscleKind, UnitKind
 from limb_nodes.model.layout import Layout
 from limb_nodes.model.system import BoundEquation
 from limb_nodes.solve.data import data_type
-from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.outputs import LENGTHS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
 
 # The arguments of all functions that are generated, one of each for every kind of muscle or motor unit.
 # own: the record of the muscle, the group or (drive, observe) the motor unit; of the muscle in the functions `units_`,
@@ -44,6 +44,7 @@ ARGUMENTS = {
     "muscle_drive": "own, excitation, model, out",
     "muscle": "own, joint_angle, joint_velocity, internal, rates, model, data",
     "muscle_t": "own, joint_angle, d_joint_angle, joint_velocity, d_joint_velocity, internal, model, data",
+    "muscle_lengths": "own, joint_angle, joint_velocity, internal, model, out",
     "muscle_observe": "own, joint_angle, joint_velocity, excitation, internal, model, data, out",
 }
 
@@ -352,6 +353,7 @@ def muscle_functions(equations: Equations, number: int, kind: MuscleKind, units:
     return [
         muscle_drive(equations, number, kind),
         muscle_primal(equations, number, kind, units),
+        muscle_lengths(equations, number, kind),
         muscle_observe(equations, number, kind, units),
         muscle_tangent(equations, number, kind, units),
     ]
@@ -417,12 +419,29 @@ def muscle_observe(equations: Equations, number: int, kind: MuscleKind, units: S
         body.compute(steady)
     body.add("rates = data.rates")
     solve_muscle(body, kind, units)
+    show(body, kind, MUSCLE_OUTPUTS)
+    return body.function("muscle_observe", number)
+
+
+def muscle_lengths(equations: Equations, number: int, kind: MuscleKind) -> str:
+    """The lengths of a muscle, which need no force."""
+    body = Body(equations)
+    stage = upstream(kind.stages["before"], set(LENGTHS))
+    used = used_by(stage) | set(LENGTHS)
+    body.load(kind.columns, used, "model.parameters", "own.parameters")
+    body.load([state.name for state, _ in kind.system.states], used, "internal", "own.state")
+    body.compute(stage)
+    show(body, kind, LENGTHS)
+    return body.function("muscle_lengths", number)
+
+
+def show(body: Body, kind: MuscleKind, outputs: Sequence[str]) -> None:
+    """Fill in outputs; what a muscle does not have is 0."""
     defined = {bound.defines for bound in kind.system.equations} | {state.name for state, _ in kind.system.states}
     defined |= {"total_fibre_force"}
-    for i, name in enumerate(MUSCLE_OUTPUTS):
+    for i, name in enumerate(outputs):
         body.add(f"out[{i}] = {name if name in defined else '0.0'}")
     body.add("return 0")
-    return body.function("muscle_observe", number)
 
 
 def gather(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
@@ -555,7 +574,7 @@ def program(layout: Layout, imports: str, entries: str) -> str:
         texts += group_loops(layout.unit_kinds, looped)
     for number, muscle_kind in enumerate(layout.muscle_kinds):
         texts += muscle_functions(equations, number, muscle_kind, layout.unit_kinds)
-    for name in ("muscle", "muscle_t", "muscle_observe", "muscle_drive"):
+    for name in ("muscle", "muscle_t", "muscle_lengths", "muscle_observe", "muscle_drive"):
         texts.append(dispatcher(name, len(layout.muscle_kinds)))
     for name in ("unit_drive", "unit_observe"):
         texts.append(dispatcher(name, len(layout.unit_kinds)))
@@ -565,6 +584,7 @@ def program(layout: Layout, imports: str, entries: str) -> str:
         "UNITS": layout.units,
         "STATES": layout.states,
         "DRIVES": layout.drives,
+        "LENGTHS": len(LENGTHS),
         "FIBRE_LENGTH": MUSCLE_OUTPUTS.index("fibre_length"),
         "FIBRE_VELOCITY": MUSCLE_OUTPUTS.index("fibre_velocity"),
         "ACTIVATION": MUSCLE_OUTPUTS.index("activation"),

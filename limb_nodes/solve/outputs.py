@@ -20,6 +20,8 @@ MUSCLE_OUTPUTS = (
     "moment_arm",
     "muscle_torque",
 )
+# Those of a muscle that have a range (`limb_nodes.solve.ranges`).
+LENGTHS = ("muscle_tendon_length", "muscle_length", "tendon_length", "aponeurosis_length", "fibre_length")
 UNIT_OUTPUTS = (
     "stimulation_frequency",
     "force_frequency_factor",

@@ -21,6 +21,7 @@ from limb_nodes.solve.integrate import DONE, integrate
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import bent, straight
 from limb_nodes.solve.problem import CONTROL, give_inputs, new_problem
+from limb_nodes.solve.ranges import Ranges
 from limb_nodes.solve.small import same
 from limb_nodes.solve.whole import WholeModel
 
@@ -51,7 +52,7 @@ def solve_tick(
 class MuscleStepper:
     """All muscles of a limb between joint states and torques.
 
-    internal: internal states, at the tick of the last joint state.
+    internal: internal states, at the tick of the last joint state. ranges: what `look` has seen.
     """
 
     def __init__(self, limb: Limb) -> None:
@@ -60,6 +61,8 @@ class MuscleStepper:
         self.joints = layout.joints
         self.internal: FloatArray = layout.initial_states.copy()
         self._state = np.zeros(2 * layout.joints + layout.states)
+        self._row = self._state[np.newaxis]
+        self.ranges = Ranges(self.model)
         self._muscles = np.zeros((layout.muscles, len(MUSCLE_OUTPUTS)))
         self._units = np.zeros((layout.units, len(UNIT_OUTPUTS)))
         self._control = tick_control()
@@ -76,6 +79,7 @@ class MuscleStepper:
     def adopt(self, model: WholeModel) -> None:
         """Go on with the numbers of another model that has the same program."""
         self.model = model
+        self.ranges = Ranges(model)
         self._start()
 
     def _rehearse(self) -> None:
@@ -89,6 +93,8 @@ class MuscleStepper:
             self.torque(*posture, drive, drive, REHEARSAL, last_drive)
             self.advance(posture, posture, drive, drive, REHEARSAL, last_drive)
         self.observe(*posture, excitation)
+        self.look()
+        self.ranges = Ranges(self.model)
         self.internal[:] = layout.initial_states
         self._start()
 
@@ -170,6 +176,10 @@ class MuscleStepper:
         records = model.layout.model.address, self._data.address
         model.program.observe(self._state, excitation, *records, self._muscles, self._units)
         return self._muscles, self._units
+
+    def look(self) -> bool:
+        """Judge the lengths of the muscles at the last `torque`; whether one leaves its range for the first time."""
+        return self.ranges.look(self._row)
 
     def culprit(self, angle: FloatArray, velocity: FloatArray, excitation: FloatArray) -> str:
         """In words, the first muscle or motor unit that shows a number that is not finite, and which."""
