@@ -16,6 +16,9 @@ from limb_nodes.errors import MOST, FieldError, UserError, clean, shortened, sho
 # How argparse begins to list what it does not know.
 UNKNOWN = "unrecognized arguments: "
 
+# How far ROS nodes find each other; unless a person says so, those of this command stay on their own machine.
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+
 
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line."""
@@ -49,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # A command that is named first needs no other command's modules.
     names = [given[0]] if given and given[0] in known else known
     options: dict[str, str] = {}
+    if not os.environ.get(RANGE):
+        os.environ[RANGE] = "LOCALHOST"
 
     def work() -> int:
         parsed = parser(names).parse_args(given)
