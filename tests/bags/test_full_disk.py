@@ -1,4 +1,4 @@
-"""A disk that is full while a bag is written or closed: one line that says how to get what is there, and it is there."""
+"""A disk that is full while a bag is written or closed: one line says how to get what is there, and it is there."""
 
 from __future__ import annotations
 

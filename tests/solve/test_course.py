@@ -1,4 +1,4 @@
-"""A movement that is solved in parts is the one that is solved at once, to the last bit; a failure says where and why."""
+"""A movement that is solved in parts is the one solved at once, to the last bit; a failure says where and why."""
 
 import dataclasses
 from pathlib import Path
