@@ -9,7 +9,7 @@ import sys
 from typing import Any
 
 from limb_nodes.commands import add_limb
-from limb_nodes.errors import FieldError
+from limb_nodes.errors import FieldError, RunError
 
 # Exit status of a run whose live source never came, or was silent at its end.
 INPUT_LOST = 3
@@ -130,7 +130,10 @@ def run(args: argparse.Namespace) -> int:
         def show(tick: int) -> None:
             bar.update(max(0, tick + 1 - bar.n))
 
-        outcome = (run_in_processes if args.processes else run_in_one_process)(ready, show)
+        try:
+            outcome = (run_in_processes if args.processes else run_in_one_process)(ready, show)
+        except RunError as error:
+            raise RunError(f"{error}{what_is_kept(ready.out)}") from None
     if outcome.interrupted and not os.path.exists(ready.out):
         print("interrupted before anything was recorded")
         return 130
@@ -157,3 +160,12 @@ def run(args: argparse.Namespace) -> int:
     if outcome.conflicts:
         return 1
     return INPUT_LOST if outcome.lost else 0
+
+
+def what_is_kept(out: str) -> str:
+    """In words, what is there of a run that could not be finished."""
+    if not os.path.exists(out):
+        return ""
+    if os.path.exists(os.path.join(out, "metadata.yaml")):
+        return f"; {out} holds what was recorded until then"
+    return f"; `limb recover {out}` makes a readable bag of what was recorded until then"

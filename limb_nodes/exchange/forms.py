@@ -83,6 +83,7 @@ def forms_of(limb: Limb) -> dict[str, Form]:
         "unit": [unit.name for muscle in limb.muscles for unit in muscle.units],
     }
     units, layout = len(of_unit["unit"]), build_layout(limb)
+    remembered = layout.states + layout.scratch + 2 * (layout.joints + layout.drives) + 1
     corner = make_message("geometry_msgs/msg/Point")
     fields: dict[str, dict[str, Any]] = {
         "activation": {"name": muscles, **zeros(["activation"], len(muscles))},
@@ -100,7 +101,7 @@ def forms_of(limb: Limb) -> dict[str, Form]:
         "muscle_state": {"name": muscles, **zeros(MUSCLE_FIELDS, len(muscles))},
         "motor_unit_state": {**of_unit, **zeros(UNIT_FIELDS, units)},
         "sarcomere_state": {**of_unit, **zeros(SARCOMERE_FIELDS, units)},
-        "muscle_checkpoint": {"state": [0.0] * (layout.states + 2 * layout.joints + 2 * layout.drives + 1)},
+        "muscle_checkpoint": {"state": [0.0] * remembered},
         "limb_checkpoint": {"state": [0.0] * (4 * layout.joints + 4)},
     }
     return {topic: Form(topic, names, share=topic == "activation") for topic, names in fields.items()}

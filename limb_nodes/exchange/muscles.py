@@ -136,23 +136,26 @@ class MusclePart(Part):
         """Send all that the following ticks depend on."""
         has_last = self.last_drive is not None
         last_drive = self.last_drive if self.last_drive is not None else np.zeros_like(self.drive)
-        parts = self.stepper.internal, self.angle, self.velocity, self.drive, last_drive, [float(has_last)]
+        parts = self.stepper.remembered, self.angle, self.velocity, self.drive, last_drive, [float(has_last)]
         self.checkpoint.values["state"][:] = np.concatenate(parts)
         self.checkpoint.publish(self.tick)
 
     def go_on_after(self, past: Past) -> None:
-        """Advance from the newest checkpoint, or from the start, along the joint states."""
+        """Answer again what was recorded behind the newest checkpoint, or from the start."""
         if past.muscles is not None:
             self.tick, data = past.muscles
             state = self.values("muscle_checkpoint", data, "state").astype(np.float64)
-            sizes = [self.stepper.internal.size, self.angle.size, self.velocity.size, self.drive.size, self.drive.size]
-            internal, self.angle, self.velocity, self.drive, last_drive, has_last = np.split(state, np.cumsum(sizes))
-            self.stepper.internal[:] = internal
-            self.last_drive = last_drive if has_last[0] else None
+            parts = self.stepper.remembered, self.angle, self.velocity, self.drive, self.drive
+            sizes = [part.size for part in parts]
+            remembered, self.angle, self.velocity, self.drive, last, has_last = np.split(state, np.cumsum(sizes))
+            self.stepper.remember(remembered)
+            self.last_drive = last if has_last[0] else None
+        activations = past.messages["activation"]
         for tick in range(self.tick + 1, past.tick + 1):
-            self.keep_activation(tick, past.messages["activation"][tick])
-            self.advance(tick, *self.joint_state(past.messages["joint_states"][tick]))
-            del self.inputs[tick]
+            for known in {tick, tick + 1} & activations.keys():
+                self.keep_activation(known, activations[known])
+            self.waiting = tick, *self.joint_state(past.messages["joint_states"][tick])
+            self.send(self.inputs.get(tick + 1))
 
     @property
     def done(self) -> int:

@@ -20,6 +20,10 @@ def stamp_of(data: bytes) -> int:
     return int(sec * SECOND + nanosec)
 
 
+def ignore(data: bytes) -> None:
+    """Send a message nowhere."""
+
+
 class Outgoing:
     """Messages of one topic.
 
@@ -30,7 +34,7 @@ class Outgoing:
     def __init__(self, form: Form, nanoseconds: int) -> None:
         """nanoseconds: of one tick."""
         self.form, self.nanoseconds = form, nanoseconds
-        self.send: Callable[[bytes], object] = lambda data: None
+        self.send: Callable[[bytes], object] = ignore
         self._data = bytearray(form.data)
         self._stamp = np.frombuffer(self._data, dtype="<u4", count=2, offset=STAMP_AT)
         self.values = {

@@ -7,7 +7,7 @@ from typing import Any
 
 from limb_nodes.exchange.forms import Form, forms_of
 from limb_nodes.exchange.identity import FRAME, frame_of, identity_of
-from limb_nodes.exchange.outgoing import Outgoing
+from limb_nodes.exchange.outgoing import Outgoing, ignore
 from limb_nodes.exchange.past import Past
 from limb_nodes.exchange.stream import Conflict, Stream
 from limb_nodes.exchange.ticks import Ticks
@@ -94,7 +94,13 @@ class Part:
         """Go on behind the last tick of what has been recorded; before the part receives anything."""
         for stream in self.streams.values():
             stream.go_on_after(past.tick)
+        # What is done again has been sent.
+        sends = {topic: messages.send for topic, messages in self.outgoing.items()}
+        for messages in self.outgoing.values():
+            messages.send = ignore
         self.go_on_after(past)
+        for topic, send in sends.items():
+            self.outgoing[topic].send = send
 
     def go_on_after(self, past: Past) -> None:
         """Become what the part was after the last tick of what has been recorded."""

@@ -10,8 +10,8 @@ from limb_nodes.exchange.outgoing import stamp_of
 from limb_nodes.exchange.stream import CHECKPOINT
 from limb_nodes.foundation.topics import SENDERS, STATES
 
-# Every how many ticks a topic has a message, if not at each.
-EVERY = {"muscle_checkpoint": CHECKPOINT, "limb_checkpoint": CHECKPOINT}
+# Nobody waits for them: a lost message of a topic that is rarely sent is missed, and sent again, only after seconds.
+CHECKPOINTS = ("muscle_checkpoint", "limb_checkpoint")
 # What the ticks behind a checkpoint are made from.
 NEEDED = ("activation", "joint_states", "joint_torque")
 
@@ -20,11 +20,13 @@ NEEDED = ("activation", "joint_states", "joint_torque")
 class Past:
     """The last ticks of a run that are recorded.
 
-    tick: the last that is there on every topic, -1 if none is. counts: topic -> messages up to it. messages: topic ->
-    tick -> message, in CDR, from the checkpoints on. muscles, limb: the newest checkpoint of muscle_stack and of
-    limb_dynamics, its tick and message; None for the start.
+    complete: the last tick that is there on every topic, -1 if none is. tick: from which a run goes on, the same or the
+    one before; the torque depends on the activation of the next tick, which must be there too. counts: topic ->
+    messages up to it. messages: topic -> tick -> message, in CDR, from the checkpoints on. muscles, limb: the newest
+    checkpoint of muscle_stack and of limb_dynamics, its tick and message; None for the start.
     """
 
+    complete: int = -1
     tick: int = -1
     counts: dict[str, int] = field(default_factory=dict)
     messages: dict[str, dict[int, bytes]] = field(default_factory=lambda: {topic: {} for topic in NEEDED})
@@ -36,7 +38,8 @@ def expected_topics(parameters: Mapping[str, Any]) -> dict[str, int]:
     """Topic of a run -> every how many ticks it has a message; parameters: of muscle_stack."""
     every = parameters.get("state_every", 1)
     states = {topic: every for topic in STATES if parameters.get(f"publish_{topic}", True)}
-    return {**{topic: EVERY.get(topic, 1) for topic in SENDERS if topic not in STATES}, **states}
+    ticked = {topic: 1 for topic in SENDERS if topic not in STATES}
+    return {**ticked, **states, **dict.fromkeys(CHECKPOINTS, CHECKPOINT)}
 
 
 def past_of(recorded: Iterable[tuple[str, bytes]], every: Mapping[str, int], nanoseconds: int) -> Past:
@@ -47,7 +50,7 @@ def past_of(recorded: Iterable[tuple[str, bytes]], every: Mapping[str, int], nan
     first gap of a topic is not used. Only so much is kept as is needed to go on.
     """
     past = Past(counts=dict.fromkeys(every, 0))
-    checkpoints: dict[str, list[tuple[int, bytes]]] = {"muscle_checkpoint": [], "limb_checkpoint": []}
+    checkpoints: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in CHECKPOINTS}
     for topic, data in recorded:
         if topic not in every or (tick := stamp_of(data) // nanoseconds) != past.counts[topic] * every[topic]:
             continue
@@ -57,7 +60,7 @@ def past_of(recorded: Iterable[tuple[str, bytes]], every: Mapping[str, int], nan
         elif topic in checkpoints:
             checkpoints[topic].append((tick, data))
             drop(past, checkpoints, every)
-    past.tick = complete(past.counts, every)
+    past.complete, past.tick = complete(past.counts, every), answered(past.counts, every)
     for topic, step in every.items():
         past.counts[topic] = past.tick // step + 1
     newest = {name: [found for found in some if found[0] <= past.tick][-1:] for name, some in checkpoints.items()}
@@ -65,14 +68,22 @@ def past_of(recorded: Iterable[tuple[str, bytes]], every: Mapping[str, int], nan
     return past
 
 
+def answered(counts: Mapping[str, int], every: Mapping[str, int]) -> int:
+    """The newest tick that is there on every topic, with the next activation, on which the torque depends; -1 if none.
+
+    A run that has ended has no next one: its last tick is done again.
+    """
+    return max(-1, min(complete(counts, every), counts["activation"] - 2))
+
+
 def complete(counts: Mapping[str, int], every: Mapping[str, int]) -> int:
     """The newest tick that is there on every topic, of so many messages from tick 0 on; -1 if none is."""
-    return min(count * every[topic] for topic, count in counts.items()) - 1
+    return min(count * every[topic] for topic, count in counts.items() if topic not in CHECKPOINTS) - 1
 
 
 def drop(past: Past, checkpoints: dict[str, list[tuple[int, bytes]]], every: Mapping[str, int]) -> None:
     """Drop what comes before the checkpoints from which all that is complete follows."""
-    tick = complete(past.counts, every)
+    tick = answered(past.counts, every)
     for name, some in checkpoints.items():
         old = [found for found in some if found[0] <= tick]
         checkpoints[name] = [*old[-1:], *some[len(old) :]]

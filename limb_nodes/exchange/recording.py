@@ -8,7 +8,7 @@ from typing import Any
 
 from limb_nodes.exchange.outgoing import stamp_of
 from limb_nodes.exchange.part import Part
-from limb_nodes.exchange.past import Past, expected_topics
+from limb_nodes.exchange.past import CHECKPOINTS, Past, expected_topics
 from limb_nodes.foundation.topics import SENDERS, STATES
 
 
@@ -62,13 +62,19 @@ class RecordingPart(Part):
     @property
     def complete(self) -> int:
         """The newest tick that is there on every topic, -1 before the first."""
-        newest = {topic: self.newest(topic) for topic in self.expected}
-        return min(tick + self.expected[topic] - 1 if tick >= 0 else -1 for topic, tick in newest.items())
+        return min(
+            self.newest(topic) + every - 1 if self.newest(topic) >= 0 else -1 for topic, every in self.awaited_topics
+        )
+
+    @property
+    def awaited_topics(self) -> list[tuple[str, int]]:
+        """The topics of which each tick is to be there, and every how many ticks they have a message."""
+        return [(topic, every) for topic, every in self.expected.items() if topic not in CHECKPOINTS]
 
     def missing(self) -> int:
         """Ticks that are not there on a topic that should have them."""
         ticks = self.newest("joint_states") + 1
-        return sum(max(0, -(-ticks // every) - self.counts[topic]) for topic, every in self.expected.items() if ticks)
+        return sum(max(0, -(-ticks // every) - self.counts[topic]) for topic, every in self.awaited_topics if ticks)
 
     @property
     def done(self) -> int:
@@ -80,5 +86,5 @@ class RecordingPart(Part):
         if self.finished:
             return ""
         tick = self.complete + 1
-        topic = next(topic for topic, every in self.expected.items() if self.newest(topic) + every - 1 < tick)
+        topic = next(topic for topic, every in self.awaited_topics if self.newest(topic) + every - 1 < tick)
         return f"{topic} of tick {tick} from {SENDERS[topic]}"

@@ -10,8 +10,9 @@ from typing import Any
 
 from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.bags.read import BagReader
-from limb_nodes.errors import FieldError
+from limb_nodes.errors import FieldError, UserError
 from limb_nodes.exchange.identity import new_identity
+from limb_nodes.exchange.recorded import RecordedRun
 from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.exchange.watch import STALL, STALL_LIMIT
 from limb_nodes.foundation.topics import NODES, STATES
@@ -130,6 +131,8 @@ def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
         raise FieldError("source", "is missing; in lockstep a bag, CSV, waveform YAML or constants are needed")
     else:
         reader(limb.muscle_names, settings.live)
+    if settings.resume and final is not None and RecordedRun.read(settings.resume).past().complete >= final:
+        raise UserError(f"{settings.resume}: is complete; the bag of a run that was cut short is needed")
     resume = str(Path(settings.resume).resolve()) if settings.resume else ""
     limb_file, out = str(Path(settings.limb).resolve()), str(Path(settings.out).resolve())
     return replace(settings, limb=limb_file, out=out, source=source, resume=resume), final

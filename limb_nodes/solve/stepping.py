@@ -99,6 +99,18 @@ class MuscleStepper:
         self._start()
 
     @property
+    def remembered(self) -> FloatArray:
+        """All that the next ticks depend on [states + scratch]; `remember` takes it.
+
+        Beside the internal states it is what the search for the forces starts from.
+        """
+        return np.concatenate([self.internal, self._data.scratch])
+
+    def remember(self, values: FloatArray) -> None:
+        """Go on from what another stepper of the same limb remembered."""
+        self.internal[:], self._data.scratch[:] = np.split(values, [self.internal.size])
+
+    @property
     def shown(self) -> tuple[FloatArray, FloatArray]:
         """The arrays that `observe` fills in."""
         return self._muscles, self._units

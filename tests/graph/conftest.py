@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -28,6 +29,7 @@ TICKED = (
     "motor_unit_state",
     "sarcomere_state",
 )
+WAITING = r"\]: waits for .* since [\d.]+ s$|^limb: no tick has been recorded for"
 # Longest wait for anything that must happen; only a failing test waits so long.
 DEADLINE = 300.0
 
@@ -72,10 +74,16 @@ class Process:
         return self.handle.poll() is None
 
     @property
-    def said(self) -> str:
+    def all_said(self) -> str:
         """What is on its standard error so far, but for remarks of Fast DDS, which tries another port then."""
         lines = self.err.read_text().splitlines(keepends=True)
         return "".join(line for line in lines if "RTPS_TRANSPORT_SHM" not in line)
+
+    @property
+    def said(self) -> str:
+        """The same, but for what nodes say that wait for each other on a busy machine."""
+        lines = self.all_said.splitlines(keepends=True)
+        return "".join(line for line in lines if not re.search(WAITING, line))
 
     @property
     def printed(self) -> str:
@@ -91,6 +99,10 @@ class Process:
             except subprocess.TimeoutExpired:
                 self.handle.kill()
                 self.handle.wait()
+
+
+def children_of(pid: int) -> list[int]:
+    return [int(text) for text in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
 class Processes:

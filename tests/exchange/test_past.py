@@ -1,0 +1,129 @@
+"""A run that goes on from what is recorded has the values of an undisturbed one, to the last bit."""
+
+from __future__ import annotations
+
+from collections import deque
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from limb_nodes.errors import UserError
+from limb_nodes.exchange.activations import ActivationPart
+from limb_nodes.exchange.movement import LimbPart
+from limb_nodes.exchange.muscles import MusclePart
+from limb_nodes.exchange.past import Past, expected_topics, past_of
+from limb_nodes.exchange.recorded import RecordedRun, join_parts
+from limb_nodes.exchange.stream import CHECKPOINT
+from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.model import load_limb
+from limb_nodes.model.limb import Limb
+
+ROOT = Path(__file__).resolve().parents[2]
+LIMBS = [*sorted((ROOT / "params").glob("*_joint*.yaml")), ROOT / "params/pennate_leg.yaml"]
+ALTERNATIVES = ROOT / "tests/levels/alternatives.yaml"
+IDENTITY = "0123456789abcdef" * 2
+TICKS = Ticks(500.0)
+FINAL = 3 * CHECKPOINT
+EVERY = expected_topics({"state_every": 3})
+# Ticks at which a run is cut short: the first, before, at and behind a checkpoint, between two, before the last.
+CUTS = [0, 1, CHECKPOINT - 1, CHECKPOINT, CHECKPOINT + 1, 2 * CHECKPOINT + 50, FINAL - 1]
+
+Message = tuple[str, bytes]
+
+
+def run(limb: Limb, past: Past | None = None) -> list[Message]:
+    """The messages of a run, or of what follows a past, in the order in which they are sent."""
+    phase = 0.03 * np.arange(FINAL + 1)[:, np.newaxis] + np.arange(len(limb.muscles))
+    activations = 0.5 + 0.5 * np.sin(phase)
+    common = {"limb": limb, "ticks": TICKS, "identity": IDENTITY}
+    parts = [
+        ActivationPart(**common, values_at=lambda tick: activations[tick], final=FINAL),
+        MusclePart(**common, state_every=3),
+        dynamics := LimbPart(**common),
+    ]
+    sent: list[Message] = []
+    waiting: deque[Message] = deque()
+    for part in parts:
+        for topic, messages in part.outgoing.items():
+
+            def send(data: bytes, topic: str = topic) -> None:
+                sent.append((topic, data))
+                waiting.append((topic, data))
+
+            messages.send = send
+        if past is not None:
+            part.take_up(past)
+    dynamics.begin()
+    while waiting:
+        topic, data = waiting.popleft()
+        for part in parts:
+            if topic in part.streams:
+                part.receive(topic, data)
+    assert all(part.finished for part in parts)
+    assert sum(part.bad_input + part.foreign for part in parts) == 0
+    return sent
+
+
+def by_topic(messages: list[Message]) -> dict[str, list[bytes]]:
+    return {topic: [data for one, data in messages if one == topic] for topic in EVERY}
+
+
+@cache
+def undisturbed(file: Path) -> tuple[Limb, list[Message]]:
+    limb = load_limb(file)
+    return limb, run(limb)
+
+
+def cut(messages: list[Message], tick: int) -> list[Message]:
+    """The messages until that with which the torque of a tick would come."""
+    torques = [k for k, (topic, _) in enumerate(messages) if topic == "joint_torque"]
+    return messages[: torques[tick]]
+
+
+@pytest.mark.parametrize("file", [*LIMBS, ALTERNATIVES], ids=lambda path: path.stem)
+def test_a_run_goes_on_where_it_was_cut_short(file):
+    limb, whole = undisturbed(file)
+    for tick in CUTS:
+        recorded = cut(whole, tick)
+        past = past_of(recorded, EVERY, TICKS.nanoseconds)
+        assert past.tick == tick - 1
+        assert len(past.messages["joint_torque"]) <= 2 * CHECKPOINT
+        rest = by_topic(run(limb, past))
+        for topic, messages in by_topic(whole).items():
+            assert messages == by_topic(recorded)[topic][: past.counts[topic]] + rest[topic], (tick, topic)
+
+
+def test_what_is_behind_a_gap_is_not_used():
+    _, whole = undisturbed(LIMBS[0])
+    torques = [k for k, (topic, _) in enumerate(whole) if topic == "joint_torque"]
+    lacking = [message for k, message in enumerate(whole) if k != torques[200]]
+    past = past_of(lacking, EVERY, TICKS.nanoseconds)
+    assert (past.tick, past.counts["joint_torque"], past.counts["muscle_state"]) == (199, 200, 67)
+    assert past.muscles is not None
+    assert past.muscles[0] == CHECKPOINT
+
+
+def test_nothing_recorded_is_the_start():
+    limb, whole = undisturbed(LIMBS[0])
+    past = past_of([], EVERY, TICKS.nanoseconds)
+    assert (past.tick, past.muscles, past.limb) == (-1, None, None)
+    assert by_topic(run(limb, past)) == by_topic(whole)
+
+
+def test_a_bag_without_parts_stays_as_it_is(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "run.mcap").write_bytes(b"whatever")
+    join_parts(str(tmp_path / "run"))
+    assert (tmp_path / "run" / "run.mcap").read_bytes() == b"whatever"
+
+
+@pytest.mark.parametrize("content", [None, b"", b"whatever", b"\x89MCAP0\r\n"], ids=str)
+def test_what_is_no_bag_of_a_run_is_refused(content, tmp_path):
+    folder = tmp_path / "run"
+    if content is not None:
+        folder.mkdir()
+        (folder / "run.mcap").write_bytes(content)
+    with pytest.raises(UserError, match=str(folder)):
+        RecordedRun.read(str(folder))
