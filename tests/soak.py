@@ -1,6 +1,6 @@
 """`python -m tests.soak`: a long run in four processes; memory, files, speed and bag in a table.
 
-Status 1 if ticks are missing, or if a process has more memory or more files open at the end than it had once it was warm.
+Status 1 if ticks are missing, or if a process has more memory or more files open at the end than once it was warm.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def memory(place: Path) -> float:
 
 
 def table(looks: list[Look], rate: float) -> list[str]:
-    """The looks, a row each: simulated time; ticks per second and longest pause since the one before; bag, processes."""
+    """The looks, a row each; ticks per second and the longest pause are since the one before."""
     names = list(looks[0].memory)
     rows = [("s", "ticks/s", "pause s", "bag MB", *(f"{name} MB, files" for name in names))]
     for before, now in zip([None, *looks], looks, strict=False):
@@ -120,7 +120,7 @@ def main() -> int:
     parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="ticks per second (default 1000)")
     parser.add_argument("--limb", default=str(PARAMS / "reference_joint_tendon.yaml"), metavar="LIMB.yaml")
     parser.add_argument("--activation", default=str(PARAMS / "activation_sine_cosine.yaml"), metavar="SOURCE")
-    parser.add_argument("--folder", metavar="DIR", help="where the bag is kept meanwhile (default: the temporary folder)")
+    parser.add_argument("--folder", metavar="DIR", help="where the bag is kept meanwhile (default: temporary)")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="limb_soak_", dir=given.folder) as folder:
         bag = Path(folder) / "bag"
