@@ -1,17 +1,17 @@
 """Writes docs/reference/dependencies.md: what the program needs, in which versions, under which licence, and what for.
 
-    python -m docs.dependencies      write the page from pyproject.toml and from what is installed
+python -m docs.dependencies      write the page from pyproject.toml and from what is installed
 """
 
 from __future__ import annotations
 
 import re
 import sys
-import tomllib
 from collections.abc import Iterable, Iterator
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
+import tomllib
 from packaging.requirements import Requirement
 
 from docs.generate import table
@@ -57,7 +57,9 @@ def requirements() -> list[tuple[Requirement, str]]:
 def licence(name: str) -> str:
     """The licence that a package declares; "not declared" if it does not."""
     about = distribution(name).metadata
-    classified = [text.rpartition(" :: ")[2] for text in about.get_all("Classifier") or [] if text.startswith("License")]
+    classified = [
+        text.rpartition(" :: ")[2] for text in about.get_all("Classifier") or [] if text.startswith("License")
+    ]
     text = about["License"] or ""
     short = text if text and "\n" not in text and len(text) < 40 else ""
     return about["License-Expression"] or short or ", ".join(classified) or "not declared"
@@ -89,10 +91,12 @@ def behind(names: Iterable[str]) -> set[str]:
 
 
 def indirect() -> Iterator[tuple[str, str]]:
-    """A row for each licence of the packages behind those: licence, packages."""
-    direct = {requirement.name for requirement, _ in requirements()}
+    """A row for each licence of the packages behind those, but for packages of ROS 2: licence, packages."""
+    direct = {re.sub(r"[-_.]+", "-", requirement.name) for requirement, _ in requirements()}
     by_licence: dict[str, list[str]] = {}
     for name in sorted(behind(direct) - direct):
+        if name.startswith("ros-"):
+            continue
         try:
             by_licence.setdefault(licence(name), []).append(name)
         except PackageNotFoundError:
@@ -109,10 +113,11 @@ packages declare. `python -m tests.dependencies` installs the lowest and the hig
 
 {table(("package", "versions", "what for", "licence"), rows())}
 
-The packages of ROS 2 are those of Jazzy, all of one release; for Kilted see `pyproject.toml`. The wheels of most of them declare no
-licence; in their sources it is Apache-2.0, or BSD-3-Clause for some.
+The packages of ROS 2 are those of Jazzy, all of one release, with those that they require in turn; for Kilted see
+`pyproject.toml`. The wheels of most of them declare no licence; in their sources it is Apache-2.0, or BSD-3-Clause for some.
+Nor does the wheel of ezc3d; in its sources it is MIT.
 
-What these require in turn, on Linux with CPython 3.11:
+What the others require in turn, on Linux with CPython 3.11:
 
 {table(("licence", "packages"), indirect())}
 
@@ -120,8 +125,8 @@ To build: scikit-build-core, CMake, ninja, empy and catkin_pkg, and packages of 
 
 ## What is never done with data
 
-Nothing from a file or from the network is unpickled: the program has no `pickle`, `marshal`, `joblib` or `eval`, and `numpy.load`
-runs with `allow_pickle=False`. numba keeps what it has compiled in files that it unpickles; they lie in
+Nothing from a file or from the network is unpickled: the program uses no `pickle`, `marshal`, `shelve` or `joblib`, and
+`numpy.load` runs with `allow_pickle=False`. numba keeps what it has compiled in files that it unpickles; they lie in
 [private folders](../how-to/what-is-safe-to-open.md). YAML is read without tags that make objects.
 """
 
