@@ -108,14 +108,14 @@ def page() -> str:
     """The page."""
     return f"""# Dependencies
 
-What `pip install .` installs, and what the extras add. Written by `python -m docs.dependencies`; the licences are those that the
-packages declare. `python -m tests.dependencies` installs the lowest and the highest versions and tests both.
+What `pip install .` installs, and what the extras add. Written by `python -m docs.dependencies`; the licences are those
+that the packages declare. `python -m tests.dependencies` installs the lowest and the highest versions and tests both.
 
 {table(("package", "versions", "what for", "licence"), rows())}
 
 The packages of ROS 2 are those of Jazzy, all of one release, with those that they require in turn; for Kilted see
-`pyproject.toml`. The wheels of most of them declare no licence; in their sources it is Apache-2.0, or BSD-3-Clause for some.
-Nor does the wheel of ezc3d; in its sources it is MIT.
+`pyproject.toml`. The wheels of most of them declare no licence; in their sources it is Apache-2.0, or BSD-3-Clause for
+some. Nor does the wheel of ezc3d; in its sources it is MIT.
 
 What the others require in turn, on Linux with CPython 3.11:
 

@@ -1,7 +1,7 @@
 """`python -m tests.dependencies [lowest] [highest]`: install with the lowest and the highest versions, and test both.
 
-Lowest are the lower bounds of pyproject.toml, highest what pip chooses within them. The packages of ROS 2 belong together
-and are the newest of their release both times. Status 1 if something cannot be installed or a test fails.
+Lowest are the lower bounds of pyproject.toml, highest what pip chooses within them. The packages of ROS 2 belong
+together and are the newest of their release both times. Status 1 if something cannot be installed or a test fails.
 """
 
 from __future__ import annotations
