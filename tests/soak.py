@@ -79,7 +79,7 @@ def nodes() -> dict[str, Path]:
     children = Path("/proc/self/task").glob("*/children")
     places = [Path("/proc", number) for file in children for number in file.read_text().split()]
     commands = {place: (place / "cmdline").read_text() for place in places}
-    return {name: place for name in NODES for place, line in commands.items() if f"limb_nodes.nodes.{name}\0" in line}
+    return {name: place for name in NODES for place, line in commands.items() if f"limb_nodes.nodes.{name}" in line}
 
 
 def memory(place: Path) -> float:
@@ -104,6 +104,7 @@ def faults(looks: list[Look], outcome: Outcome, ticks: int) -> list[str]:
     found = []
     if outcome.ticks < ticks or outcome.missing:
         found.append(f"{ticks - outcome.ticks} ticks and {outcome.missing} messages of others are missing")
+    found += [f"{name} was not found among the processes" for name in NODES if name not in looks[0].memory]
     warm, last = looks[int(WARM * len(looks))], looks[-1]
     for name, before in warm.memory.items():
         if last.memory[name] > before + GAIN:

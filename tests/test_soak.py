@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from limb_nodes.foundation.topics import NODES
 from limb_nodes.nodes.settings import Outcome
 from tests.soak import GAIN, Look, faults
 
@@ -27,7 +28,8 @@ def test_a_short_run_is_looked_at_and_is_well(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-WELL = [Look(tick, float(tick), 0.1, {"recorder": 100.0}, {"recorder": 19}, 1.0) for tick in range(8)]
+MEMORY, FILES = dict.fromkeys(NODES, 100.0), dict.fromkeys(NODES, 19)
+WELL = [Look(tick, float(tick), 0.1, MEMORY, FILES, 1.0) for tick in range(8)]
 DONE = Outcome(8, 0, 0, 0, 0, 0, 8.0, False)
 
 
@@ -35,8 +37,8 @@ DONE = Outcome(8, 0, 0, 0, 0, 0, 8.0, False)
     ("last", "outcome", "words"),
     [
         ({}, DONE, None),
-        ({"memory": {"recorder": 100.0 + GAIN + 1.0}}, DONE, "recorder has grown from 100.0 to 109.0 MB"),
-        ({"files": {"recorder": 20}}, DONE, "recorder has 20 files open, 19 before"),
+        ({"memory": {**MEMORY, "recorder": 100.0 + GAIN + 1.0}}, DONE, "recorder has grown from 100.0 to 109.0 MB"),
+        ({"files": {**FILES, "recorder": 20}}, DONE, "recorder has 20 files open, 19 before"),
         ({}, replace(DONE, missing=3), "0 ticks and 3 messages of others are missing"),
         ({}, replace(DONE, ticks=6), "2 ticks and 0 messages of others are missing"),
     ],
