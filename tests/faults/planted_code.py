@@ -17,10 +17,12 @@ from tests.faults.trial import Trial
 
 KIND = "code planted in folders and caches"
 SIMULATE = ("simulate", "../there/bare.yaml", "--activation", "none=0", "--duration", "0.05")
+# A namespace that no other run of this machine has.
+RUN = ("run", *SIMULATE[1:], "--out", "out", "--namespace", f"planted_{os.getpid()}")
 COMMANDS = {
     "simulate": SIMULATE,
-    "run": ("run", *SIMULATE[1:], "--out", "out"),
-    "run --processes": ("run", *SIMULATE[1:], "--out", "out", "--processes"),
+    "run": RUN,
+    "run --processes": (*RUN, "--processes"),
     "curves": ("curves", str(PARAMS / "reference_joint.yaml"), "-o", "out.png"),
 }
 # Modules that these commands, their nodes and what they use import.
