@@ -78,7 +78,7 @@ class BagWriter:
         self._connections: dict[str, Connection] = {}
         self._pending: deque[tuple[Connection, int, bytes | memoryview]] = deque()
         self._failure: Exception | None = None
-        self._told = False
+        self._told = self._finished = False
         self._closed = Event()
         text = run_info if isinstance(run_info, str) else _yaml_text(run_info)
 
@@ -226,9 +226,9 @@ class BagWriter:
                 return
 
     def _attempt(self, write: Callable[[], None]) -> None:
-        """Write in the thread; nothing more once that has failed, for the file ends within a record then."""
+        """Write in the thread; nothing more once the bag is finished, or that has failed: its file ends in a record."""
         try:
-            if self._failure is None:
+            if self._failure is None and not self._finished:
                 write()
         except Exception as error:
             self._failure = error
@@ -248,6 +248,8 @@ class BagWriter:
     def _finish(self) -> None:
         self._drain()
         self._attempt(self._writer.close)
+        # A flush may have been asked for just before.
+        self._finished = True
         if self._failure is not None:
             with suppress(Exception):
                 self._writer.abort()

@@ -26,7 +26,7 @@ from limb_nodes.exchange.watch import LOOK_PERIOD, STALL, STALL_LIMIT, Watch
 from limb_nodes.model import Limb, load_limb
 from limb_nodes.nodes.distribution import given_parameters, parameter_values
 from limb_nodes.nodes.messages import class_of
-from limb_nodes.nodes.qos import LIVE, SPARSE, STREAM
+from limb_nodes.nodes.qos import LIVE, STREAM, stream_of
 
 MODES = ("lockstep", "realtime")
 # What the nodes of a limb declare, all together: a file of parameters may be for all of them.
@@ -98,7 +98,7 @@ class LimbNode(Node):
         if self.resume:
             part.take_up(self.recorded_run().past())
         for topic, messages in part.outgoing.items():
-            messages.send = self.create_publisher(class_of(topic), topic, SPARSE.get(topic, STREAM)).publish
+            messages.send = self.create_publisher(class_of(topic), topic, stream_of(topic)).publish
         for topic in part.streams if listen else ():
 
             def receive(data: bytes, topic: str = topic) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from limb_nodes.exchange.past import EVERY as EVERY_TICKS
-from limb_nodes.exchange.stream import HISTORY
+from limb_nodes.exchange.past import CHECKPOINTS
+from limb_nodes.exchange.stream import CHECKPOINT, HISTORY
 
 STREAM = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
@@ -13,18 +13,14 @@ STREAM = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
-# As STREAM, for topics with a message every so many ticks: the same ticks, and those that may be on their way. Fast DDS
-# tells readers with each message what was before it only once its history is full; until then a message that was lost
-# is missed after up to 3 s.
-SPARSE = {
-    topic: QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=HISTORY // every,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL,
-    )
-    for topic, every in EVERY_TICKS.items()
-}
+# As STREAM, for checkpoints: those of the same ticks. Fast DDS tells readers with each message what was before it only
+# once its history is full; until then a message that was lost is missed after up to 3 s.
+SPARSE = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=HISTORY // CHECKPOINT,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
 LATCHED = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=1,
@@ -51,3 +47,8 @@ BEST_EFFORT = QoSProfile(
     reliability=ReliabilityPolicy.BEST_EFFORT,
     durability=DurabilityPolicy.VOLATILE,
 )
+
+
+def stream_of(topic: str) -> QoSProfile:
+    """That of a topic of a run."""
+    return SPARSE if topic in CHECKPOINTS else STREAM
