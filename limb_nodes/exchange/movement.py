@@ -28,7 +28,8 @@ class LimbPart(Part):
     clock, with the newest torque; ticks whose torque is not there in time are counted.
 
     tick: that the limb is at. last_tick: of the run, -1 while it is not known. missed: deadlines. started_at: when real
-    time began (s of the monotonic clock). recorded: the newest tick that the recorder has, -1 before.
+    time began (s of the monotonic clock). recorded: the newest tick that the recorder has, -1 before. again: whether it
+    goes on from what is recorded.
     """
 
     def __init__(self, *given: Any, awaits_recorder: bool = False, **options: Any) -> None:
@@ -36,7 +37,7 @@ class LimbPart(Part):
         self.awaits_recorder = awaits_recorder
         self.stepper = LimbStepper(self.limb)
         self.tick = 0
-        self.begun = False
+        self.begun = self.again = False
         self.most_ahead = max(1, round(MOST_AHEAD / self.ticks.period))
         self.behind = False
         self.missed = 0
@@ -66,7 +67,8 @@ class LimbPart(Part):
 
     def on_recorded(self, tick: int) -> None:
         """The recorder has every tick up to this one; -1 when it is ready."""
-        if not self.recorded <= tick <= self.tick:
+        # The recorder may have ticks that are done again.
+        if tick < self.recorded or (tick > self.tick and not self.again):
             self.refuse(f"recorder_progress: tick {tick} is not from {self.recorded} to {self.tick}")
             return
         self.recorded = tick
@@ -182,7 +184,7 @@ class LimbPart(Part):
         for tick in range(self.tick, past.tick + 1):
             self.stepper.step(self.rows(past.messages["joint_torque"][tick]), self.ticks.period)
         self.tick = past.tick + 1
-        self.recorded = past.tick
+        self.again = True
 
     def before_the_end(self) -> None:
         """What is to be said before the message with which the recording ends."""

@@ -103,7 +103,8 @@ def process(child: subprocess.Popen[str], victim: str) -> int:
     if victim not in NODES:
         return child.pid
     children = Path(f"/proc/{child.pid}/task/{child.pid}/children").read_text().split()
-    return next(int(pid) for pid in children if victim.encode() in Path(f"/proc/{pid}/cmdline").read_bytes())
+    module = f"limb_nodes.nodes.{victim} ".encode()
+    return next(int(pid) for pid in children if module in Path(f"/proc/{pid}/cmdline").read_bytes())
 
 
 def reached(out: Path) -> int:

@@ -53,7 +53,8 @@ def size(bag: Path) -> int:
 
 def node(run: Any, name: str) -> int:
     """The process of a node of a run."""
-    (pid,) = (pid for pid in children_of(run.handle.pid) if name.encode() in Path(f"/proc/{pid}/cmdline").read_bytes())
+    module = f"limb_nodes.nodes.{name} ".encode()
+    (pid,) = (pid for pid in children_of(run.handle.pid) if module in Path(f"/proc/{pid}/cmdline").read_bytes())
     return pid
 
 
