@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,8 @@ class LimbPart(Part):
         self.behind = False
         self.missed = 0
         self.recorded = -1
-        self.pending: FloatArray | None = None
+        # Torques of this tick and those that follow, which a node that is started anew gets at once.
+        self.pending: deque[FloatArray] = deque()
         self.newest: tuple[int, FloatArray] | None = None
         self.history: OrderedDict[int, tuple[FloatArray, FloatArray]] = OrderedDict()
         self.started_at: float | None = None
@@ -74,25 +75,32 @@ class LimbPart(Part):
         self.recorded = tick
         if not self.begun:
             self.offer()
-        elif self.pending is not None and self.tick - self.recorded <= RECORDER_LAG:
-            held, self.pending = self.pending, None
-            self.step(held)
+        self.go_on()
 
     def on_torque(self, tick: int, data: bytes) -> None:
         """Take over a torque; in lockstep also step."""
-        if tick > self.tick:
+        if self.realtime and tick > self.tick and not self.again:
             self.refuse(f"joint_torque: a message is of tick {tick}, which has not been; the limb is at {self.tick}")
             return
         rows = self.rows(data)
         self.last_tick = self.forms["joint_torque"].number(data, "last_tick")
-        if self.realtime:
-            self.newest = tick, rows
-            if self.behind:
-                self.catch_up(int(self.elapsed()))
-        elif self.awaits_recorder and self.tick - self.recorded > RECORDER_LAG:
-            self.pending = rows
-        elif not self.finished:
-            self.step(rows)
+        if not self.realtime:
+            self.pending.append(rows)
+            self.go_on()
+            return
+        self.newest = tick, rows
+        if self.behind:
+            self.catch_up(int(self.elapsed()))
+
+    def go_on(self) -> None:
+        """In lockstep, step as far as torques are there and the recorder is near."""
+        while self.pending and self.begun and not self.finished and not self.ahead:
+            self.step(self.pending.popleft())
+
+    @property
+    def ahead(self) -> bool:
+        """Whether the limb must wait for the recorder."""
+        return self.awaits_recorder and self.tick - self.recorded > RECORDER_LAG
 
     def rows(self, data: bytes) -> FloatArray:
         """Torque and slopes [4, n] of a message."""
@@ -206,7 +214,7 @@ class LimbPart(Part):
         """The torque of this tick, or the recorder."""
         if self.finished:
             return ""
-        if self.pending is not None:
+        if self.pending:
             return f"the recording of tick {self.recorded + 1} from recorder"
         if not self.begun:
             return "the start of the recording from recorder"
