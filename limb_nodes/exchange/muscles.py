@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -24,7 +25,8 @@ Input = tuple[FloatArray, FloatArray]
 class MusclePart(Part):
     """From activations and joint states to joint torques and the states of muscles.
 
-    tick: the newest that is answered. states: topics of states that are sent, every `state_every` ticks. tell_ranges:
+    tick: the newest that is answered. states: topics of states that are sent, every `state_every` ticks. waiting: joint
+    states that are not answered yet; a node that is started anew gets many before the first activation. tell_ranges:
     called when a length of a muscle leaves its range for the first time, and before the last answer.
     """
 
@@ -40,7 +42,7 @@ class MusclePart(Part):
         self.last_drive: FloatArray | None = None
         self.excitation: FloatArray = np.zeros(muscles)
         self.inputs: dict[int, Input] = {}
-        self.waiting: tuple[int, FloatArray, FloatArray] | None = None
+        self.waiting: deque[tuple[int, FloatArray, FloatArray]] = deque()
         self.torque, self.checkpoint = self.sends("joint_torque"), self.sends("muscle_checkpoint")
         self.states = [self.copied(topic) for topic in states]
         self.takes("activation", self.on_activation, gaps=self.realtime)
@@ -76,24 +78,22 @@ class MusclePart(Part):
 
     def on_joint_states(self, tick: int, data: bytes) -> None:
         """Keep the joint states; in real time the ones before are answered first, with what is there."""
-        if self.waiting is not None and self.realtime:
+        if self.waiting and self.realtime:
             self.send(None)
-        self.waiting = tick, *self.joint_state(data)
+        self.waiting.append((tick, *self.joint_state(data)))
         self.answer()
 
     def answer(self) -> None:
-        """Send the torque that is waited for, if its activations are there."""
-        if self.waiting is None:
-            return
-        tick = self.waiting[0]
-        if tick in self.inputs and (tick == self.last_tick or tick + 1 in self.inputs):
+        """Send the torques that are waited for, as far as their activations are there."""
+        while self.waiting:
+            tick = self.waiting[0][0]
+            if tick not in self.inputs or not (tick == self.last_tick or tick + 1 in self.inputs):
+                return
             self.send(self.inputs.get(tick + 1))
 
     def send(self, following: Input | None) -> None:
-        """Advance to the tick that waits and send its torque and states. Raises RunError."""
-        assert self.waiting is not None
-        tick, angle, velocity = self.waiting
-        self.waiting = None
+        """Advance to the first tick that waits and send its torque and states. Raises RunError."""
+        tick, angle, velocity = self.waiting.popleft()
         excitation, drive = self.advance(tick, angle, velocity)
         next_drive = drive if following is None else following[1]
         rows = self.stepper.torque(angle, velocity, drive, next_drive, self.ticks.period, self.last_drive)
@@ -154,7 +154,7 @@ class MusclePart(Part):
         for tick in range(self.tick + 1, past.tick + 1):
             for known in {tick, tick + 1} & activations.keys():
                 self.keep_activation(known, activations[known])
-            self.waiting = tick, *self.joint_state(past.messages["joint_states"][tick])
+            self.waiting.append((tick, *self.joint_state(past.messages["joint_states"][tick])))
             self.send(self.inputs.get(tick + 1))
 
     @property
@@ -166,7 +166,7 @@ class MusclePart(Part):
         """What the next answer needs."""
         if self.finished:
             return ""
-        if self.waiting is None:
+        if not self.waiting:
             return f"joint_states of tick {self.tick + 1} from limb_dynamics"
-        tick = self.waiting[0]
+        tick = self.waiting[0][0]
         return f"activation of tick {tick + (tick in self.inputs)} from activation_input"
