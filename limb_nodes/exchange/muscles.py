@@ -98,10 +98,8 @@ class MusclePart(Part):
         next_drive = drive if following is None else following[1]
         rows = self.stepper.torque(angle, velocity, drive, next_drive, self.ticks.period, self.last_drive)
         if not finite(rows.reshape(-1)):
-            raise RunError(
-                f"{self.limb.file}: {self.stepper.culprit(angle, velocity, excitation)} at {tick * self.ticks.period:g}"
-                f" s (tick {tick}), which is no number; a law that gives finite values there is needed"
-            )
+            why = self.stepper.fault() or "a slope of the torque is not a finite number"
+            raise RunError(f"{self.limb.file}: stops at {tick * self.ticks.period:g} s, tick {tick}: {why}")
         if self.stepper.look() or tick == self.last_tick:
             self.tell_ranges()
         if self.states and tick % self.state_every == 0:

@@ -57,10 +57,20 @@ def where(model: WholeModel, status: int, t: float, state: FloatArray, inputs: F
             break
     else:
         return ""
-    for number in range(model.layout.muscles):
-        for fault in _faults(model, number, moved, data, good):
-            return f": {fault}"
+    if fault := fault_of(model, moved, data, good):
+        return f": {fault}"
     return f": that of {_state_name(model, int(np.flatnonzero(~np.isfinite(bad))[0]))}"
+
+
+def fault_of(model: WholeModel, state: FloatArray, data: Record, good: FloatArray) -> str:
+    """In words, the first thing of a muscle or its units that is not finite in a state; "" if there is none.
+
+    good: scratch numbers before it was.
+    """
+    for number in range(model.layout.muscles):
+        for fault in _faults(model, number, state, data, good):
+            return fault
+    return ""
 
 
 def _state_name(model: WholeModel, index: int) -> str:

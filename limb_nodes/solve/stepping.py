@@ -15,7 +15,7 @@ from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.records import Record
 from limb_nodes.model.limb import Limb
 from limb_nodes.solve.explicit import EXPLICIT
-from limb_nodes.solve.failure import FAILURES, SolveError
+from limb_nodes.solve.failure import FAILURES, SolveError, fault_of
 from limb_nodes.solve.held import hold, predict
 from limb_nodes.solve.integrate import DONE, integrate
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
@@ -193,18 +193,9 @@ class MuscleStepper:
         """Judge the lengths of the muscles at the last `torque`; whether one leaves its range for the first time."""
         return self.ranges.look(self._row)
 
-    def culprit(self, angle: FloatArray, velocity: FloatArray, excitation: FloatArray) -> str:
-        """In words, the first muscle or motor unit that shows a number that is not finite, and which."""
-        muscles, units = self.observe(angle, velocity, excitation)
-        limb = self.model.limb
-        of_unit = [f"{muscle.name}.{unit.name}" for muscle in limb.muscles for unit in muscle.units]
-        for names, outputs, shown in (
-            (of_unit, UNIT_OUTPUTS, units),
-            (limb.muscle_names, MUSCLE_OUTPUTS, muscles),
-        ):
-            for row, column in np.argwhere(~np.isfinite(shown)):
-                return f"muscles.{names[row]}: {outputs[column]} is {shown[row, column]:g}"
-        return "muscles: the torque or one of its slopes is not finite"
+    def fault(self) -> str:
+        """In words, what of the muscles is not finite in the state of the last torque; "" if it is not known."""
+        return fault_of(self.model, self._state, self._data, np.zeros_like(self._data.scratch))
 
 
 class LimbStepper:

@@ -78,17 +78,20 @@ def test_a_long_input_takes_its_drives_from_the_table_in_every_part(model_named,
     np.testing.assert_array_equal(found, model.simulate(excitation, 1000.0).angle)
 
 
-def broken_limb(folder: Path, edge: float) -> WholeModel:
-    """The reference joint with a law that gives NaN for fibres about as long as an edge."""
+def broken_text(folder: Path, edge: float) -> str:
+    """The reference joint with a law, written into a folder, that gives NaN for fibres about as long as an edge."""
     text = Path("params/reference_joint.yaml").read_text()
     head, _, tail = text.partition("    force_length:\n")
     (folder / "breaks_off.py").write_text(LAW.format(edge=edge))
     lines = tail.splitlines(keepends=True)
     kept = next(i for i, line in enumerate(lines) if not line.startswith("      "))
-    (folder / "limb.yaml").write_text(
-        f"{head}    force_length:\n      law: breaks_off:breaks_off\n{''.join(lines[kept:])}"
-    )
-    return WholeModel(load_limb(folder / "limb.yaml"))
+    return f"{head}    force_length:\n      law: breaks_off:breaks_off\n{''.join(lines[kept:])}"
+
+
+def broken_limb(folder: Path, edge: float) -> WholeModel:
+    """The same, ready to be solved."""
+    (folder / "limb.yaml").write_text(broken_text(folder, edge))
+    return WholeModel(load_limb(folder / "limb.yaml", allow_laws=True))
 
 
 @pytest.mark.parametrize("method", ["explicit", "implicit"])
