@@ -40,6 +40,8 @@ PARAMETERS = {
 ROS_PARAMETERS = ("use_sim_time", "qos_overrides.", "start_type_description_service")
 # The variable by which a run tells the nodes in processes of their own whose children they are: they end with it.
 PARENT = "LIMB_RUN_PARENT"
+# The variable by which it tells them to stay when they have finished: whoever is started anew may need their messages.
+STAY = "LIMB_RUN_STAY"
 # How long a node that a person has started waits for the others without a word (s).
 UNSAID = 10.0
 

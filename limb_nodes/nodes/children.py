@@ -17,7 +17,7 @@ from pathlib import Path
 from limb_nodes.bags.unclosed import new_part
 from limb_nodes.errors import RunError, UserError
 from limb_nodes.foundation.topics import NODES
-from limb_nodes.nodes.base import PARENT
+from limb_nodes.nodes.base import PARENT, STAY
 from limb_nodes.nodes.settings import RunSettings
 
 # How long a node may take to end when asked to (s): a recorder may have much to write.
@@ -97,6 +97,7 @@ class Child:
         arguments = ["--ros-args"]
         if settings.namespace:
             arguments += ["-r", f"__ns:=/{settings.namespace.removeprefix('/')}"]
+        stays = settings.respawn and name != "recorder"
         own = {} if copies else {"copies": False}
         for key, value in {**settings.parameters(name), **own}.items():
             text = str(value).lower() if isinstance(value, bool) else value
@@ -112,7 +113,7 @@ class Child:
             errors="replace",
             # Ctrl-C goes to this process alone, which then ends the others in order.
             start_new_session=True,
-            env={**os.environ, PARENT: str(os.getpid())},
+            env={**os.environ, PARENT: str(os.getpid()), STAY: "1" if stays else ""},
         )
         # Read all the time: a child whose pipe is full would stand still.
         self.reader = threading.Thread(target=self._read, daemon=True)

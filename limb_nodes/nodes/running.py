@@ -24,7 +24,7 @@ from rclpy.validate_namespace import validate_namespace
 
 from limb_nodes.edge import guarded
 from limb_nodes.errors import FieldError
-from limb_nodes.nodes.base import PARENT
+from limb_nodes.nodes.base import PARENT, STAY
 from limb_nodes.nodes.distribution import make_executor
 
 # The executor is asked for one event at a time with a time-out: without one it hangs when idle.
@@ -96,7 +96,8 @@ def run_guarded(node_class: Callable[..., Any], args: Sequence[str] | None) -> i
         gc.freeze()
         parent = os.environ.get(PARENT)
         orphaned = (lambda: str(os.getppid()) != parent) if parent else (lambda: False)
-        spin(executor, lambda: interrupt.wanted or node.finished or bool(node.failure) or orphaned())
+        stays = bool(os.environ.get(STAY))
+        spin(executor, lambda: interrupt.wanted or (node.finished and not stays) or bool(node.failure) or orphaned())
         node.raise_failure()
         if not interrupt.wanted:
             linger(executor, node, interrupt)
