@@ -18,12 +18,10 @@ from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.model import Limb
 from limb_nodes.model.layout import build_layout
 from limb_nodes.model.points import point_names
+from limb_nodes.solve.fits import OTHER_FORM, OTHER_NUMBERS, fits
 from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, UNIT_FIELDS
-from limb_nodes.solve.small import finite, within_unit
 
-# Where the body of a message begins, from which its numbers are aligned.
-BODY = 4
-NUMBER = np.dtype("<f8")
+DOUBLE = np.dtype("<f8")
 
 
 class Form:
@@ -47,23 +45,19 @@ class Form:
             for name, (start, dtype, shape) in layout.numbers.items()
         }
         # Whoever receives a message has looked at its identity.
-        constant = [(a, b) for a, b in layout.constant if (a, b) != (TEXT.start, TEXT.stop)]
-        self._constant = [(slice(a, b), self.data[a:b]) for a, b in joined(constant)]
-        places = [
-            np.arange(count) + (start - BODY) // NUMBER.itemsize
-            for start, dtype, _, count in self.numbers.values()
-            if dtype == NUMBER
-        ]
-        self._places = np.concatenate([np.empty(0, dtype=np.int64), *places])
-        self._words = (len(self.data) - BODY) // NUMBER.itemsize
-        self._good, self._needed = (within_unit, "numbers from 0 to 1") if share else (finite, "finite numbers")
+        constant = [np.arange(a, b) for a, b in layout.constant if (a, b) != (TEXT.start, TEXT.stop)]
+        doubles = [start + 8 * np.arange(count) for start, dtype, _, count in self.numbers.values() if dtype == DOUBLE]
+        self._example = np.frombuffer(self.data, dtype=np.uint8)
+        self._constant, self._doubles = (np.concatenate([np.empty(0, np.int64), *all_]) for all_ in (constant, doubles))
+        self._share = share
 
     def check(self, data: bytes) -> None:
         """Raise ValueError if a message does not look like these, or holds numbers that it may not."""
-        if len(data) != len(self.data) or any(data[at] != text for at, text in self._constant):
+        told = fits(np.frombuffer(data, np.uint8), self._example, self._constant, self._doubles, self._share)
+        if told == OTHER_FORM:
             raise ValueError(f"is no {self.type} with the names and the numbers of values of this limb")
-        if not self._good(np.frombuffer(data, NUMBER, self._words, BODY)[self._places]):
-            raise ValueError(f"has other values than {self._needed}")
+        if told == OTHER_NUMBERS:
+            raise ValueError(f"has other values than {'numbers from 0 to 1' if self._share else 'finite numbers'}")
 
     def values(self, data: bytes, name: str) -> np.ndarray:
         """A field of a message, as an array that must not be kept."""
@@ -110,14 +104,3 @@ def forms_of(limb: Limb) -> dict[str, Form]:
 def zeros(fields: Sequence[str] | Mapping[str, Any], count: int) -> dict[str, list[float]]:
     """Fields with so many numbers each."""
     return {field: [0.0] * count for field in fields}
-
-
-def joined(ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Ranges with those that touch made one."""
-    result: list[tuple[int, int]] = []
-    for start, end in ranges:
-        if result and result[-1][1] == start:
-            result[-1] = result[-1][0], end
-        elif end > start:
-            result.append((start, end))
-    return result

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any
 
-from limb_nodes.exchange.outgoing import stamp_of
 from limb_nodes.exchange.part import Part
 from limb_nodes.exchange.past import CHECKPOINTS, Past, expected_topics
 from limb_nodes.foundation.topics import SENDERS, STATES
@@ -40,9 +39,9 @@ class RecordingPart(Part):
         for topic, count in past.counts.items():
             self.counts[topic] = count
 
-    def on_message(self, topic: str, _: int, data: bytes) -> None:
+    def on_message(self, topic: str, tick: int, data: bytes) -> None:
         """Keep a message until it is drained."""
-        self._new[topic].append((stamp_of(data), data))
+        self._new[topic].append((tick * self.ticks.nanoseconds, data))
 
     def drain(self, topic: str, arrived: Iterable[bytes]) -> list[tuple[int, bytes]]:
         """Take what has arrived on a topic; stamps (ns) and messages of the ticks that are new."""

@@ -19,15 +19,6 @@ def finite(values):
     return True
 
 
-@njit(CHECK, cache=True)
-def within_unit(values):
-    """Whether all numbers [n] are from 0 to 1."""
-    for value in values:
-        if not 0.0 <= value <= 1.0:
-            return False
-    return True
-
-
 @njit(cache=True)
 def same(one, other):
     """Whether two arrays [n] hold the same numbers."""
