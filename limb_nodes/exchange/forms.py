@@ -6,6 +6,7 @@ bytes are made once, and afterwards only the numbers in them are written or read
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -21,7 +22,7 @@ from limb_nodes.model.points import point_names
 from limb_nodes.solve.fits import OTHER_FORM, OTHER_NUMBERS, fits
 from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, UNIT_FIELDS
 
-DOUBLE = np.dtype("<f8")
+DOUBLE, TICK = np.dtype("<f8"), struct.Struct("<q")
 
 
 class Form:
@@ -50,6 +51,7 @@ class Form:
         self._example = np.frombuffer(self.data, dtype=np.uint8)
         self._constant, self._doubles = (np.concatenate([np.empty(0, np.int64), *all_]) for all_ in (constant, doubles))
         self._share = share
+        self._tick_at = self.numbers["tick"][0] if "tick" in self.numbers else None
 
     def check(self, data: bytes) -> None:
         """Raise ValueError if a message does not look like these, or holds numbers that it may not."""
@@ -58,6 +60,10 @@ class Form:
             raise ValueError(f"is no {self.type} with the names and the numbers of values of this limb")
         if told == OTHER_NUMBERS:
             raise ValueError(f"has other values than {'numbers from 0 to 1' if self._share else 'finite numbers'}")
+
+    def tick_of(self, data: bytes, otherwise: int) -> int:
+        """The tick that a message tells beside its stamp, if those of its topic do."""
+        return otherwise if self._tick_at is None else int(TICK.unpack_from(data, self._tick_at)[0])
 
     def values(self, data: bytes, name: str) -> np.ndarray:
         """A field of a message, as an array that must not be kept."""

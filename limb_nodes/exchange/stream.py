@@ -14,10 +14,11 @@ HISTORY = 2 * RECORDER_LAG
 CHECKPOINT = RECORDER_LAG // 2
 
 Message = tuple[int, bytes]
+NOTHING: Message = (-1, b"")
 
 
 class Conflict(ValueError):
-    """A tick has come twice, with different numbers: somebody else publishes in the name of the run."""
+    """A tick has come twice, with different numbers, or too late: somebody else publishes in the name of the run."""
 
 
 class Stream:
@@ -34,25 +35,31 @@ class Stream:
         """
         self.form = form
         self.next, self.every = 0, 1
+        # From here on each tick has been taken, or was passed over.
+        self._first = 0
         self._nanoseconds, self._gaps = nanoseconds, gaps
-        self._kept: list[Message] = [(-1, b"")] * HISTORY
-        self._ahead: Message = (-1, b"")
+        self._kept: list[Message] = [NOTHING] * HISTORY
+        self._ahead = NOTHING
 
     def take(self, data: bytes) -> tuple[Message, ...]:
         """The messages that are to be taken now: mostly this one.
 
-        Raises ValueError that says what is wrong with the message, Conflict if another one of its tick was taken.
+        Raises ValueError that says what is wrong with the message, Conflict if another one was taken in its place.
         """
         self.form.check(data)
         tick, rest = divmod(stamp_of(data), self._nanoseconds)
         if rest or tick < 0:
             raise ValueError("has a stamp that is no tick of this rate")
+        if self.form.tick_of(data, tick) != tick:
+            raise ValueError(f"has the stamp of tick {tick} and the number of another")
         if tick == self.next:
             return self._take((tick, data))
         if tick < self.next:
             known = self._kept[tick % HISTORY]
             if known[0] == tick and known[1] != data:
                 raise Conflict(f"of tick {tick} has come twice with different values")
+            if known[0] < tick and tick >= self._first:
+                raise Conflict(f"of tick {tick} has come after others that passed it over")
             return ()
         if self._gaps:
             before, self._ahead = self._ahead, (tick, data)
@@ -62,9 +69,12 @@ class Stream:
 
     def go_on_after(self, tick: int) -> None:
         """Take next what follows a tick."""
-        self.next = tick + self.every - tick % self.every
+        self._first = self.next = tick + self.every - tick % self.every
 
     def _take(self, *messages: Message) -> tuple[Message, ...]:
+        ahead, self._ahead = self._ahead, NOTHING
+        if ahead[0] == messages[-1][0] + self.every:
+            messages += (ahead,)
         for message in messages:
             self._kept[message[0] % HISTORY] = message
         self.next = messages[-1][0] + self.every
