@@ -41,6 +41,9 @@ class RecordingPart(Part):
 
     def on_message(self, topic: str, tick: int, data: bytes) -> None:
         """Keep a message until it is drained."""
+        if 0 <= self.last_tick < tick:
+            self.refuse(f"{topic}: a message is of tick {tick}; {self.last_tick} is the last of the run")
+            return
         self._new[topic].append((tick * self.ticks.nanoseconds, data))
 
     def drain(self, topic: str, arrived: Iterable[bytes]) -> list[tuple[int, bytes]]:
