@@ -20,7 +20,7 @@ from std_msgs.msg import Header
 from limb_nodes.errors import FieldError, RunError, UserError
 from limb_nodes.exchange.recorded import join_parts
 from limb_nodes.exchange.ticks import Ticks
-from limb_nodes.exchange.watch import Watch
+from limb_nodes.exchange.watch import LOOK_PERIOD, Watch
 from limb_nodes.foundation.topics import NODES
 from limb_nodes.nodes.activation_input import ActivationInput
 from limb_nodes.nodes.children import Crew
@@ -141,8 +141,10 @@ class Observer(Node):
     def __init__(self, settings: RunSettings, context: Context) -> None:
         super().__init__("limb_run", context=context, namespace=settings.namespace or None)
         self.recorded = -1
-        # The nodes themselves say what they wait for, unless all stand still.
-        self._watch = Watch(settings.stall_limit + SLACK, math.inf, SOON)
+        # The nodes themselves say what they wait for, unless those stand still that would.
+        limit = settings.stall_limit + SLACK
+        self._recording, self._stops = Watch(limit, math.inf, SOON), Watch(limit, math.inf, SOON)
+        self._next_look = 0.0
         self._identity, self._ticks = settings.identity, Ticks(settings.rate)
         self.create_subscription(Header, "recorder_progress", self._on_progress, STREAM)
 
@@ -151,15 +153,21 @@ class Observer(Node):
             self.recorded = tick_of(message.stamp, self._ticks)
 
     def look(self, crew: Crew) -> None:
-        """Say if nothing is recorded; raise RunError if that has lasted too long."""
-        said = self._watch.look(time.monotonic(), self.recorded, "a tick")
-        if said or self._watch.given_up:
-            stopped = crew.stopped()
-            what = f"no tick has been recorded for {self._watch.waited:.0f} s"
-            what += f"; stopped by somebody: {stopped}" if stopped else "; the nodes say what they wait for"
-            if self._watch.given_up:
-                raise RunError(what)
-            print(f"limb: {what}", file=sys.stderr)
+        """Say if nothing is recorded or nodes are stopped; raise RunError if that has lasted too long."""
+        now = time.monotonic()
+        if now < self._next_look:
+            return
+        self._next_look = now + LOOK_PERIOD
+        stopped = crew.stopped()
+        for watch, done, awaited, what in (
+            (self._recording, self.recorded, "a tick", "no tick has been recorded for {:.0f} s"),
+            (self._stops, 1, stopped, f"stopped by somebody: {stopped} for {{:.0f}} s"),
+        ):
+            said, told = watch.look(now, done, awaited), what.format(watch.waited)
+            if watch.given_up:
+                raise RunError(told)
+            if said:
+                print(f"limb: {told}", file=sys.stderr)
 
     def why_nothing_comes(self) -> str:
         """What to look at if a run does not begin."""

@@ -106,7 +106,7 @@ def judged(run: Run) -> Trial:
     # Nobody waits for a checkpoint.
     short = not bags or any(key[0] not in CHECKPOINTS for key in expected.keys() ^ bags[-1].keys())
     parts = [process.part for process in run.everyone]
-    failed = any(process.status != 0 for process in run.everyone)
+    failed = run.gave_up or any(process.status != 0 for process in run.everyone)
     conflicts = sum(part.conflicts for part in parts)
     missing = sum(bag.part.missing() for bag in run.bags)
     stuck = any(process.waits for process in run.everyone)

@@ -453,7 +453,8 @@ class Run:
         self.ended = self.gave_up = False
         self._coming: set[str] = set()
         self._revived: dict[str, int] = {}
-        self._watch = Watch(schedule.limit + SLACK, math.inf)
+        limit = schedule.limit + SLACK
+        self._watch, self._stops = Watch(limit, math.inf, SOON), Watch(limit, math.inf, SOON)
         self._taken = 0
         self.newest: dict[str, Any] = {}
         self._sent: dict[tuple[str, str], int] = {}
@@ -486,9 +487,11 @@ class Run:
         if self.ended:
             return
         self.after(LOOK_PERIOD, self._look)
-        if said := self._watch.look(self.now, self.recorded, "a tick"):
-            self.say("limb run", said)
-        if self._watch.given_up or (self.recorded < 1 and self.now > STARTING):
+        stopped = ", ".join(name for name, process in self.processes.items() if process.alive and process.stopped)
+        for watch, done, awaited in (self._watch, self.recorded, "a tick"), (self._stops, 1, stopped):
+            if said := watch.look(self.now, done, awaited):
+                self.say("limb run", said)
+        if self._watch.given_up or self._stops.given_up or (self.recorded < 1 and self.now > STARTING):
             self.say("limb run", "no tick has been recorded")
             self.gave_up = True
             self.end_all()

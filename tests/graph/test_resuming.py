@@ -91,7 +91,7 @@ def test_a_node_that_is_stopped_is_named_and_goes_on_with_the_run(begun, undistu
     child, out = begun("--processes", "--stall-limit", "300")
     pid = node(child, "muscle_stack")
     os.kill(pid, signal.SIGSTOP)
-    until(lambda: f"stopped by somebody: muscle_stack (process {pid})" in child.all_said, "who is stopped")
+    until(lambda: f"limb: stopped by somebody: muscle_stack (process {pid}) for" in child.all_said, "who is stopped")
     assert "from muscle_stack since" in child.all_said
     os.kill(pid, signal.SIGCONT)
     assert child.wait() == 0, child.all_said
