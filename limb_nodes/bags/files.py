@@ -50,7 +50,69 @@ def open_files(path: Path, stack: ExitStack) -> list[BagFile]:
     if not path.exists():
         raise UserError(f"{path}: no such bag")
     files = _files_of(path) if path.is_dir() else [path]
-    return [_open(path, _unpacked(file, stack), stack) for file in files]
+    return [_open(path, _wholly_unpacked(file, stack), stack) for file in files]
+
+
+def files_there(path: Path) -> list[Path]:
+    """The files of messages of a bag, whatever its metadata.yaml says, in the order of their numbers.
+
+    path: its folder, or one file. Of a file that is there packed and unpacked, the unpacked one.
+    """
+    if not path.is_dir():
+        return [path]
+    files = [file for file in path.iterdir() if file.is_file() and is_bag_file(file)]
+    return sorted((file for file in files if file == plain_name(file) or plain_name(file) not in files), key=_numbered)
+
+
+def metadata_of(file: Path) -> dict[str, Any]:
+    """What a metadata.yaml says of its bag. Raises UserError if it can't be read."""
+    content, _ = read_yaml(file)
+    information = content.get("rosbag2_bagfile_information") if isinstance(content, dict) else None
+    if not isinstance(information, dict):
+        raise UserError(f"{file}: rosbag2_bagfile_information is missing")
+    return information
+
+
+def is_database(file: Path) -> bool:
+    """Whether a file is one of sqlite3, by its first bytes or its name."""
+    with file.open("rb") as stream:
+        magic = stream.read(8)
+    return (magic not in _MAGIC and file.suffix.lower() == ".db3") or _MAGIC.get(magic) is Sqlite3Reader
+
+
+def plain_name(file: Path) -> Path:
+    """A file's name without the suffix of its packing."""
+    return file.with_suffix("") if file.suffix.lower() in PACKED else file
+
+
+def unpacked(file: Path, stack: ExitStack) -> tuple[Path, bool]:
+    """The file itself, or a copy that is unpacked as far as it can be, and whether that is all of it.
+
+    stack: removes the copy. Raises UserError if there is no room, or if it is too large for a bag.
+    """
+    if file.suffix.lower() not in PACKED:
+        return file, True
+    folder = Path(stack.enter_context(TemporaryDirectory(prefix="limb_bag_")))
+    most = most_bytes(file)
+    if shutil.disk_usage(folder).free < file.stat().st_size:
+        raise UserError(f"{file}: cannot be unpacked, for {folder.parent} is full; room is needed there")
+    copy = folder / plain_name(file).name
+    size = 0
+    with copy.open("wb") as out:
+        try:
+            with file.open("rb") as packed, _UNPACKERS[file.suffix.lower()](packed) as stream:
+                while block := stream.read(_BLOCK):
+                    size += len(block)
+                    if size > most:
+                        raise UserError(
+                            f"{file}: takes more than {most} bytes unpacked; a bag of measured values is needed"
+                        )
+                    out.write(block)
+        except (EOFError, RuntimeError, zstandard.ZstdError):
+            return copy, False
+        except OSError as error:
+            raise UserError(f"{file}: cannot be unpacked: {one_line(error)}; a whole file is needed") from None
+    return copy, True
 
 
 def most_bytes(path: Path) -> int:
@@ -82,11 +144,10 @@ def _files_of(folder: Path) -> list[Path]:
     metadata = folder / "metadata.yaml"
     if metadata.exists():
         return _listed(metadata)
-    files = [file for file in sorted(folder.iterdir()) if file.is_file() and is_bag_file(file)]
-    files = [file for file in files if file.suffix.lower() not in PACKED or file.with_suffix("") not in files]
+    files = files_there(folder)
     if not files:
         raise UserError(f"{folder}: is no bag; a folder with a metadata.yaml and a file of messages is needed")
-    kinds = {(re.sub(r"_\d+$", "", _bare(file).stem), _bare(file).suffix.lower()) for file in files}
+    kinds = {(re.sub(r"_\d+$", "", plain_name(file).stem), plain_name(file).suffix.lower()) for file in files}
     if len(kinds) > 1:
         names = ", ".join(file.name for file in files[:6]) + (", ..." if len(files) > 6 else "")
         raise UserError(f"{folder}: holds several bags and no metadata.yaml; one of the files {names} is needed")
@@ -97,19 +158,20 @@ def _listed(metadata: Path) -> list[Path]:
     """The files that a metadata.yaml names."""
     folder = metadata.parent
     try:
-        content, _ = read_yaml(metadata)
-        information = content["rosbag2_bagfile_information"]
-        names = [PurePath(name).name for name in information["relative_file_paths"]]
-    except (UserError, KeyError, TypeError) as error:
+        names = metadata_of(metadata)["relative_file_paths"]
+        if not isinstance(names, list) or not all(isinstance(name, str) and PurePath(name).name for name in names):
+            raise UserError("relative_file_paths is no list of names")
+        there = {file.name for file in folder.iterdir()}
+    except (OSError, UserError, KeyError) as error:
         raise UserError(
             f"{folder}: is no bag that can be read, for its metadata.yaml is damaged: {one_line(error)}; a bag is read "
             "without that file too"
         ) from None
-    files = [folder / name for name in names]
+    files = [folder / PurePath(name).name for name in names]
     for index, file in enumerate(files):
-        if not file.exists() and (bare := _bare(file)).exists():
-            files[index] = bare
-        elif not file.exists():
+        if file.name not in there and plain_name(file).name in there:
+            files[index] = plain_name(file)
+        elif file.name not in there:
             raise UserError(
                 f"{folder}: the file {file.name}, which its metadata.yaml names, is missing; it is needed, or no "
                 "metadata.yaml to read the files that are there"
@@ -119,33 +181,17 @@ def _listed(metadata: Path) -> list[Path]:
     return files
 
 
-def _bare(file: Path) -> Path:
-    """A file's name without the suffix of its packing."""
-    return file.with_suffix("") if file.suffix.lower() in PACKED else file
-
-
-def _unpacked(file: Path, stack: ExitStack) -> Path:
+def _wholly_unpacked(file: Path, stack: ExitStack) -> Path:
     """The file itself, or a copy that is unpacked."""
-    if file.suffix.lower() not in PACKED:
-        return file
-    folder = Path(stack.enter_context(TemporaryDirectory(prefix="limb_bag_")))
-    most = most_bytes(file)
-    if shutil.disk_usage(folder).free < file.stat().st_size:
-        raise UserError(f"{file}: cannot be unpacked, for {folder.parent} is full; room is needed there")
-    copy = folder / _bare(file).name
-    size = 0
-    try:
-        with file.open("rb") as packed, _UNPACKERS[file.suffix.lower()](packed) as stream, copy.open("wb") as out:
-            while block := stream.read(_BLOCK):
-                size += len(block)
-                if size > most:
-                    raise UserError(
-                        f"{file}: takes more than {most} bytes unpacked; a bag of measured values is needed"
-                    )
-                out.write(block)
-    except (OSError, EOFError, RuntimeError, zstandard.ZstdError) as error:
-        raise UserError(f"{file}: cannot be unpacked: {one_line(error)}; a whole file is needed") from None
+    copy, whole = unpacked(file, stack)
+    if not whole:
+        raise UserError(f"{file}: cannot be unpacked, for it is damaged; a whole file is needed")
     return copy
+
+
+def _numbered(file: Path) -> list[tuple[int, str]]:
+    """The name of a file in the order in which a recorder numbers its files: a_2 before a_10."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", file.name)]
 
 
 def _open(path: Path, file: Path, stack: ExitStack) -> BagFile:
@@ -193,7 +239,7 @@ def _check_journal(path: Path, file: Path) -> None:
         if journal.exists() and journal.stat().st_size:
             raise UserError(
                 f"{path}: the recorder did not close this bag, {journal.name} holds messages; "
-                f"`sqlite3 {file} 'PRAGMA wal_checkpoint(TRUNCATE); VACUUM'` brings them into the database"
+                f"`limb recover {path}` makes a readable one of both"
             )
 
 

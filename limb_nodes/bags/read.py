@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Connection, MessageDefinitionFormat
-from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 from rosbags.typesys.store import Typestore
 
 from limb_nodes.bags.columns import Columns, columns
@@ -294,6 +293,4 @@ class BagReader:
             yield stamp, message
 
     def _damaged(self, error: Exception) -> UserError:
-        database = any(isinstance(file, Sqlite3Reader) for file in self._files)
-        repair = "sqlite3 FILE .recover" if database else f"limb recover {self.path}"
-        return UserError(f"{self.path}: the bag is damaged: {one_line(error)}; try `{repair}`")
+        return UserError(f"{self.path}: the bag is damaged: {one_line(error)}; try `limb recover {self.path}`")

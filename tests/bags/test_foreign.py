@@ -162,7 +162,7 @@ def test_what_is_no_bag_or_two(tmp_path: Path) -> None:
 def test_messages_beside_a_database_are_not_lost_without_a_word(tmp_path: Path) -> None:
     path = foreign.write(tmp_path / "a", "/emg", rows(), plugin=SQLITE)
     (path / "a.db3-wal").write_bytes(b"some")
-    assert "the recorder did not close this bag, a.db3-wal holds messages; `sqlite3 " in refusal(path)
+    assert "the recorder did not close this bag, a.db3-wal holds messages; `limb recover " in refusal(path)
 
 
 def test_a_time_that_no_clock_shows_is_damage(tmp_path: Path) -> None:

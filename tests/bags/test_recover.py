@@ -14,6 +14,7 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 from rosbags.rosbag2 import Reader
+from ruamel.yaml import YAML
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.bags.recover import recover
@@ -21,6 +22,7 @@ from limb_nodes.bags.types import RUN_INFO, limb_typestore, make_message
 from limb_nodes.bags.write import BagWriter, open_writer
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.topics import TOPIC_TYPES
+from tests.bags import foreign
 
 RECORD_WITHOUT_END = """
 import sys
@@ -131,19 +133,31 @@ def test_a_file_cut_anywhere_gives_the_messages_before_the_cut(tmp_path: Path) -
     assert {*CHUNKS[1:]} - {390} <= {*counts} <= {*CHUNKS[1:]}
 
 
-@pytest.mark.parametrize("place", [0.3, 0.5, 0.9])
-def test_damage_in_the_middle_ends_the_recovery_there(place: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize("place", [0.2, 0.3, 0.5, 0.9])
+@pytest.mark.parametrize("width", [1, 3_000])
+def test_damage_costs_the_chunks_in_which_it_is(place: float, width: int, tmp_path: Path) -> None:
     file = in_chunks(tmp_path / "whole")
     data = bytearray(file.read_bytes())
-    data[int(place * len(data))] ^= 0xFF
+    at = int(place * len(data))
+    data[at : at + width] = bytes(255 - byte for byte in data[at : at + width])
     file.write_bytes(data)
     result = recover(tmp_path / "whole", tmp_path / "out")
-    assert result.truncated
-    # The chunks before the damaged one, whole.
-    assert result.counts["/activation"] == max(first for first in CHUNKS if first < place * CHUNKS[-1])
     with BagReader(tmp_path / "out") as reader:
         assert reader.run_info() == {"seed": 1}
-        np.testing.assert_array_equal(reader.table("activation")["tick"], np.arange(result.counts["/activation"]))
+        ticks = reader.table("activation")["tick"].tolist()
+    lost = sorted(set(range(CHUNKS[-1])) - set(ticks))
+    # Noise is packed evenly: the bytes tell the messages.
+    damaged = [(first, end) for first, end in pairwise(CHUNKS) if lost and first <= lost[-1] and end > lost[0]]
+    assert lost == list(range(damaged[0][0], damaged[-1][1]))
+    assert len(damaged) <= 2
+    assert result.truncated
+    assert result.expected["/activation"] - result.counts["/activation"] == len(lost)
+    assert result.lost == {"/activation": [(lost[0], lost[-1], len(lost))]}
+    assert any("bytes cannot be read" in note for note in result.notes)
+    with Reader(tmp_path / "out") as plain:
+        assert plain.message_count == len(ticks) + 1
+    metadata = YAML(typ="safe", pure=True).load((tmp_path / "out" / "metadata.yaml").read_text())
+    assert metadata["rosbag2_bagfile_information"]["message_count"] == len(ticks) + 1
 
 
 def test_a_whole_bag_is_copied(tmp_path: Path) -> None:
@@ -157,6 +171,36 @@ def test_a_whole_bag_is_copied(tmp_path: Path) -> None:
     with Reader(tmp_path / "whole") as plain, Reader(tmp_path / "out") as plain_copy:
         assert [c.ext for c in plain.connections] == [c.ext for c in plain_copy.connections]
         assert [c.digest for c in plain.connections] == [c.digest for c in plain_copy.connections]
+
+
+def test_all_that_describes_the_messages_is_lost_but_one_copy(tmp_path: Path) -> None:
+    """The head, the first chunk and the end of a file: what the topics are stands outside of the chunks too."""
+    file = in_chunks(tmp_path / "whole")
+    (tmp_path / "whole" / "metadata.yaml").unlink()
+    data = bytearray(file.read_bytes())
+    chunk = data.find(b"zstd") - 37
+    data[:8] = bytes(8)
+    data[chunk : chunk + 200] = bytes(200)
+    del data[-2000:]
+    file.write_bytes(data)
+    result = recover(tmp_path / "whole", tmp_path / "out")
+    assert result.counts["/activation"] > CHUNKS[-2]
+    assert any("run_info is lost" in note for note in result.notes)
+    with BagReader(tmp_path / "out") as bag:
+        assert bag.topics == {"/activation": TOPIC_TYPES["activation"]}
+
+
+def test_a_message_with_a_wrong_value_is_not_kept(tmp_path: Path) -> None:
+    """A chunk without compression, its checksum the only thing that tells."""
+    rows = [(k, make_message(TOPIC_TYPES["activation"], k, tick=k, activation=[0.5] * 20)) for k in range(300)]
+    file = foreign.write_mcap(tmp_path / "a.mcap", "/activation", rows)
+    data = bytearray(file.read_bytes())
+    data[data.index(np.float64(0.5).tobytes() * 20) + 6] ^= 0x10
+    file.write_bytes(data)
+    result = recover(file, tmp_path / "out")
+    assert 0 < result.counts["/activation"] < 300
+    with BagReader(tmp_path / "out") as bag:
+        assert (bag.table("activation")["activation"] == 0.5).all()
 
 
 def test_topics_that_are_not_of_ros_2_are_left_out(tmp_path: Path) -> None:
@@ -173,19 +217,22 @@ def test_topics_that_are_not_of_ros_2_are_left_out(tmp_path: Path) -> None:
             limb_typestore().serialize_cdr(make_message("std_msgs/msg/String", data="a"), "std_msgs/msg/String")
         )
         for topic, schema in zip(("/good", "/proto", "/broken"), schemas, strict=True):
-            writer.add_message(writer.register_channel(topic, "cdr", schema), 5, string, 5)
+            data = b"\0\1\0\0\1" if topic == "/broken" else string
+            writer.add_message(writer.register_channel(topic, "cdr", schema), 5, data, 5)
         writer.add_message(writer.register_channel("/none", "json", 0), 5, b"{}", 5)
         writer.finish()
     result = recover(tmp_path / "a.mcap", tmp_path / "out")
-    assert result.counts == {"/good": 1}
-    assert result.left_out == {"/proto", "/broken", "/none"}
+    # A type whose definition is damaged is that of this installation.
+    assert result.counts == {"/good": 1, "/broken": 1}
+    assert result.left_out == {"/proto", "/none"}
     with BagReader(tmp_path / "out") as bag:
         assert bag.table("good")["data"].tolist() == "a"
+        assert bag.table("broken")["data"].tolist() == [True]
 
 
 def test_nothing_is_written_if_there_is_nothing_to_recover(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
-    for bag, said in ((tmp_path / "none", "no such bag"), (tmp_path / "empty", r"no \.mcap file")):
+    for bag, said in ((tmp_path / "none", "no such bag"), (tmp_path / "empty", "no file of messages")):
         with pytest.raises(UserError, match=said):
             recover(bag, tmp_path / "out")
     (tmp_path / "empty" / "a.mcap").write_bytes(b"\x89MCAP0\r\n")
