@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from limb_nodes.bags.read import BagReader
-from tests.solve.test_course import broken_text
+from tests.solve.broken_limb import write_broken_limb
 
 RUN = ["--activation", "flexor=0.9,extensor=0", "--duration", "2", "--allow-laws"]
 
@@ -17,7 +17,7 @@ RUN = ["--activation", "flexor=0.9,extensor=0", "--duration", "2", "--allow-laws
     ids=["simulate", "one process", "four processes", "real time"],
 )
 def test_the_same_answer_from_every_command(command, options, processes, tmp_path):
-    (tmp_path / "limb.yaml").write_text(broken_text(tmp_path, 1.24))
+    write_broken_limb(tmp_path, 1.24)
     out = tmp_path / "out"
     child = processes.limb(command, tmp_path / "limb.yaml", *RUN, "--out", out, *options)
     assert child.wait() == 1
