@@ -8,6 +8,8 @@ from collections import Counter
 _MOST = 10_000
 # Stamps further apart than so many steps have a gap between them.
 _GAP = 1.5
+# Stamps are rounded to as much (ns).
+_ROUNDING = 2
 
 
 class Stamps:
@@ -52,18 +54,23 @@ class Stamps:
         step = self.step
         if not step:
             return []
-        edges = [] if start is None else [(start - step, start - step)]
+        edges = []
         for first, apart, count in sorted(self._runs):
             if apart > _GAP * step:
                 edges += [(first + k * apart, first + k * apart) for k in range(count)]
             else:
                 edges.append((first, first + apart * (count - 1)))
-        edges += [] if end is None else [(end + step, end + step)]
         found = []
+        before = 0 if start is None else (edges[0][0] - start + _ROUNDING) // step
+        if before > 0:
+            found.append((edges[0][0] - before * step, edges[0][0] - step, before))
         reached = edges[0][1]
         for first, last in edges[1:]:
             if first - reached > _GAP * step:
                 count = round((first - reached) / step) - 1
                 found.append((reached + step, first - step, count))
             reached = max(reached, last)
+        behind = 0 if end is None else (end - reached + _ROUNDING) // step
+        if behind > 0:
+            found.append((reached + step, reached + behind * step, behind))
         return found

@@ -21,7 +21,6 @@ _FORMATS = {
     "ros2idl": MessageDefinitionFormat.IDL,
     "omgidl": MessageDefinitionFormat.IDL,
 }
-_CDR = (b"\0\0", b"\0\1")
 # Serialised messages may end on a full word.
 _PADDING = 3
 # So many damaged places of a file are told.
@@ -109,17 +108,15 @@ class Judge:
 
     def __init__(self, others: Mapping[str, str]) -> None:
         self._others = others
-        self._known: set[tuple[Origin, int]] = set()
+        self._known: set[tuple[Origin, int, bytes]] = set()
 
     def kind(self, topic: str) -> str:
         """The type of a topic by the bag's metadata, "" if that does not tell it."""
         return self._others.get(topic, "")
 
     def quick(self, origin: Origin, data: bytes) -> bool:
-        """`fits`, which is asked only for a length that has not been seen yet."""
-        if (origin, len(data)) in self._known and data[:2] in _CDR:
-            return True
-        return self.fits(origin, data)
+        """`fits`, which is asked only for a length, or a form of CDR, that has not been seen yet."""
+        return (origin, len(data), data[:2]) in self._known or self.fits(origin, data)
 
     def fits(self, origin: Origin, data: bytes) -> bool:
         """Whether the fields of a message take as many bytes as it has; of an unknown type anything fits."""
@@ -133,7 +130,7 @@ class Judge:
             return False
         if not 0 <= len(data) - layout.end <= _PADDING:
             return False
-        self._known.add((origin, len(data)))
+        self._known.add((origin, len(data), data[:2]))
         return True
 
     def guess(self, data: bytes, taken: Collection[str], number: int) -> Origin | None:

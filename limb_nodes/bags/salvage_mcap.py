@@ -166,10 +166,12 @@ class McapSalvage:
         return None
 
     def _ends_well(self, source: Source, record: Record) -> bool:
-        """Whether the length of a message without a checksum can be right: the next record or its type say so."""
-        if record.opcode != _MESSAGE or record.end == source.size or _record_at(source, record.end) is not None:
+        """Whether the length of a record without a checksum can be right: the next one or its content say so."""
+        if record.opcode in (_SCHEMA, _CHANNEL, _CHUNK, _FOOTER) or record.end == source.size:
             return True
-        return self._believable(source, record)
+        return _record_at(source, record.end) is not None or (
+            record.opcode == _MESSAGE and self._believable(source, record)
+        )
 
     def _believable(self, source: Source, record: Record) -> bool:
         """Whether what looks like a record behind damage is one."""

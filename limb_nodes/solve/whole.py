@@ -33,7 +33,7 @@ TABLE_PAYS_ONCE = 1_000_000
 # Rate (1/s) from which steps that accuracy allows would be unstable with the explicit method.
 STIFF = 2000.0
 # Numbers of a part of a movement that is solved piece by piece, and most of its instants.
-PART, LONGEST_PART = 2**18, 2048
+PART, LONGEST_PART = 2**18, 512
 
 
 @dataclass(frozen=True)

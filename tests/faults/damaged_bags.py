@@ -49,14 +49,15 @@ Contents = dict[Key, bytes]
 class Sample:
     """A whole bag.
 
-    contents: its messages. places: of each, the stretches of its file without which it cannot be read. checked: whether
-    checksums vouch for them.
+    contents: its messages. places: of each, the stretches of its file without which it cannot be read. named: the
+    stretches of which each tells the names of all topics. checked: whether checksums vouch for the messages.
     """
 
     folder: Path
     file: str
     contents: Contents = field(default_factory=dict)
     places: dict[Key, list[tuple[int, int]]] = field(default_factory=lambda: defaultdict(list))
+    named: list[tuple[int, int]] = field(default_factory=list)
     checked: bool = False
 
     @property
@@ -155,6 +156,13 @@ def with_chunks(sample: Sample) -> Sample:
         for key, near in zip(sample.contents, inside, strict=True):
             if near:
                 sample.places[key].append((chunk.chunk_start_offset, chunk.chunk_start_offset + chunk.chunk_length))
+    chunk = reader.chunks[0].chunk_start_offset
+    sample.named = [
+        (chunk, chunk + reader.chunks[0].chunk_length),
+        (reader.data_end, (sample.folder / sample.file).stat().st_size),
+    ]
+    if b"/activation" in (sample.folder / sample.file).read_bytes()[:chunk]:
+        sample.named.append((0, chunk))
     reader.close()
     return sample
 
@@ -393,16 +401,20 @@ def trial(sample: Sample, work: Path, seed: int) -> Trial:
 HUNG = 15.0
 
 
+def touches(mutation: Mutation, place: tuple[int, int]) -> bool:
+    """Whether a stretch of the whole file is no longer as it was."""
+    return any(place[0] < end and start < place[1] for start, end in mutation.touched)
+
+
 def compared(sample: Sample, mutation: Mutation, kept: Contents, *, doubtful: bool) -> tuple[float, bool]:
     """How much (s) outside the damage is lost, and whether a value differs that should not. doubtful: is said to be."""
     # A topic whose name is lost has a number instead.
     keys = {data: key for key, data in sample.contents.items()}
     found = {keys.get(data, key) if NUMBERED.match(key[0]) else key: data for key, data in kept.items()}
-    whole = {
-        key
-        for key in sample.contents
-        if not any(start < b and a < end for start, end in sample.places[key] for a, b in mutation.touched)
-    }
+    whole = {key for key in sample.contents if not any(touches(mutation, place) for place in sample.places[key])}
+    if sample.named and all(touches(mutation, place) for place in sample.named):
+        # No program can tell then whose messages these are.
+        whole &= found.keys()
     missing = {stamp for topic, stamp in whole if (topic, stamp) not in found}
     # Where there are checksums, they vouch for what lies in the damage too.
     vouched = found if sample.checked and not doubtful else whole & found.keys()

@@ -28,10 +28,10 @@ from limb_nodes.foundation.topics import TOPIC_TYPES
 
 with open(sys.argv[2], "r+b") as file:
     told = mmap.mmap(file.fileno(), 16)
-begun = time.monotonic()
 kind = TOPIC_TYPES["activation"]
 bag = BagWriter(sys.argv[1], {"seed": 7, "period_ns": 1_000_000})
 bag.expect({"activation": kind})
+begun = time.monotonic()
 count = 0
 while True:
     while count * 1e-3 <= time.monotonic() - begun:
