@@ -51,7 +51,9 @@ class Form:
         self._example = np.frombuffer(self.data, dtype=np.uint8)
         self._constant, self._doubles = (np.concatenate([np.empty(0, np.int64), *all_]) for all_ in (constant, doubles))
         self._share = share
-        self._tick_at = self.numbers["tick"][0] if "tick" in self.numbers else None
+        self._tick_at, self._last_at = (
+            self.numbers[name][0] if name in self.numbers else None for name in ("tick", "last_tick")
+        )
 
     def check(self, data: bytes) -> None:
         """Raise ValueError if a message does not look like these, or holds numbers that it may not."""
@@ -64,6 +66,10 @@ class Form:
     def tick_of(self, data: bytes, otherwise: int) -> int:
         """The tick that a message tells beside its stamp, if those of its topic do."""
         return otherwise if self._tick_at is None else int(TICK.unpack_from(data, self._tick_at)[0])
+
+    def ends_before(self, data: bytes, tick: int) -> bool:
+        """Whether a message tells a last tick of the run that has been before."""
+        return self._last_at is not None and -1 != TICK.unpack_from(data, self._last_at)[0] < tick
 
     def values(self, data: bytes, name: str) -> np.ndarray:
         """A field of a message, as an array that must not be kept."""

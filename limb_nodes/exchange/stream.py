@@ -52,6 +52,8 @@ class Stream:
             raise ValueError("has a stamp that is no tick of this rate")
         if self.form.tick_of(data, tick) != tick:
             raise ValueError(f"has the stamp of tick {tick} and the number of another")
+        if self.form.ends_before(data, tick):
+            raise ValueError(f"of tick {tick} tells a last tick that has been")
         if tick == self.next:
             return self._take((tick, data))
         if tick < self.next:

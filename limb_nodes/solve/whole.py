@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -147,7 +148,7 @@ class WholeModel:
         return out[:-1].T
 
     def stiffness(self) -> float:
-        """Fastest rate (1/s) of the limb at its start with all muscles fully excited.
+        """Fastest rate (1/s) of the limb at its start with all muscles fully excited; infinite if it has none there.
 
         By differences: the program of the exact slopes need not be compiled to find that it is not
         needed.
@@ -159,7 +160,8 @@ class WholeModel:
         problem = self.problem(data)
         give_inputs(problem, inputs)
         difference_slopes(problem.address, state, self.state_scale, slopes)
-        return float(np.abs(np.linalg.eigvals(slopes)).max())
+        # Where to blame is found by the solve, which cannot begin.
+        return float(np.abs(np.linalg.eigvals(slopes)).max()) if np.isfinite(slopes).all() else math.inf
 
     @cached_property
     def suited_method(self) -> str:
