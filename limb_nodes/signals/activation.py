@@ -36,6 +36,8 @@ ROUNDING = 1e-6
 # An envelope that exceeds its maximum seldom exceeds it twice; one in percent does.
 LEAST_PERCENT = 2.0
 RATE = Parameter("rate", "Hz", "ticks per second", above=0.0)
+# Stamps of ROS hold twice as much (s).
+LONGEST = 1e9
 DURATION = Parameter("duration", "s", "simulated time", above=0.0)
 
 
@@ -140,6 +142,8 @@ def _check_count(duration: float, rate: float) -> None:
             f"is {rate:g}, {duration * rate:.3g} ticks in {duration:g} s; at most {MOST_TICKS:g} ticks, which fit in "
             "memory, are needed",
         )
+    if duration > LONGEST:
+        raise FieldError("duration", f"is {duration:g}; at most {LONGEST:g} in s is needed")
 
 
 def _from_waveforms(

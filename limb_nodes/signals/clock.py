@@ -127,6 +127,10 @@ def _fit(source: str, times: FloatArray, place: Callable[[int], str], stated: fl
         ticks = rows.astype(np.int64) if missing.any() else None
         line = step, offset, 0.0
     slope, offset, width = line
+    if slope * _HIGHEST < 1.0 - 1e-6:
+        raise UserError(
+            f"{source}: the times are {slope:.6g} s apart; {1.0 / _HIGHEST:g} s or more is needed, or a rate"
+        )
     residual = relative - slope * rows
     residual -= offset
     noise = 1.4826 * float(np.median(np.abs(residual)))

@@ -22,6 +22,10 @@ from limb_nodes.signals.text_options import TextOptions
 _SLOWEST = 10.0
 
 
+# Seconds in a stamp of ROS are a number of 32 bits.
+LONGEST = 2**31
+
+
 @dataclass(frozen=True)
 class Recording:
     """Channels sampled together at one rate.
@@ -44,6 +48,14 @@ class Recording:
     notes: tuple[str, ...] = ()
     start: float | None = None
     skipped: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Raise UserError if it lasts longer than the stamps of ROS can tell."""
+        if not len(self.values) < LONGEST * self.rate:
+            raise UserError(
+                f"{self.source}: lasts {len(self.values) / self.rate:.6g} s at {self.rate:g} Hz; less than "
+                f"{LONGEST} s, as the stamps of ROS hold, is needed"
+            )
 
     def unit(self, name: str) -> str:
         """The unit of a channel."""

@@ -34,7 +34,7 @@ TABLE_PAYS_ONCE = 1_000_000
 # Rate (1/s) from which steps that accuracy allows would be unstable with the explicit method.
 STIFF = 2000.0
 # Numbers of a part of a movement that is solved piece by piece, and most of its instants.
-PART, LONGEST_PART = 2**18, 512
+PART, LONGEST_PART = 2**18, 2048
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class WholeModel:
         return out[:-1].T
 
     def stiffness(self) -> float:
-        """Fastest rate (1/s) of the limb at its start with all muscles fully excited; infinite if it has none there.
+        """Fastest rate (1/s) of the limb at its start with all muscles fully excited.
 
         By differences: the program of the exact slopes need not be compiled to find that it is not
         needed.
@@ -160,8 +160,9 @@ class WholeModel:
         problem = self.problem(data)
         give_inputs(problem, inputs)
         difference_slopes(problem.address, state, self.state_scale, slopes)
-        # Where to blame is found by the solve, which cannot begin.
-        return float(np.abs(np.linalg.eigvals(slopes)).max()) if np.isfinite(slopes).all() else math.inf
+        if not np.isfinite(slopes).all():
+            return math.inf  # the solve itself says where and why
+        return float(np.abs(np.linalg.eigvals(slopes)).max())
 
     @cached_property
     def suited_method(self) -> str:
