@@ -8,8 +8,8 @@ from collections import Counter
 _MOST = 10_000
 # Stamps further apart than so many steps have a gap between them.
 _GAP = 1.5
-# Stamps are rounded to as much (ns).
-_ROUNDING = 2
+# Stamps are rounded to such a part of a step.
+_ROUNDING = 1000
 
 
 class Stamps:
@@ -61,7 +61,7 @@ class Stamps:
             else:
                 edges.append((first, first + apart * (count - 1)))
         found = []
-        before = 0 if start is None else (edges[0][0] - start + _ROUNDING) // step
+        before = 0 if start is None else (edges[0][0] - start + step // _ROUNDING) // step
         if before > 0:
             found.append((edges[0][0] - before * step, edges[0][0] - step, before))
         reached = edges[0][1]
@@ -70,7 +70,7 @@ class Stamps:
                 count = round((first - reached) / step) - 1
                 found.append((reached + step, first - step, count))
             reached = max(reached, last)
-        behind = 0 if end is None else (end - reached + _ROUNDING) // step
+        behind = 0 if end is None else (end - reached + step // _ROUNDING) // step
         if behind > 0:
             found.append((reached + step, reached + behind * step, behind))
         return found

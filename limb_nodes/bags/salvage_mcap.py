@@ -45,6 +45,8 @@ _SHAPES: dict[int, str] = {
     14: "188",
     15: "4",
 }
+# Those whose length is fixed, or told by their content in several places.
+_SURE = (_FOOTER, _SCHEMA, _CHANNEL, _CHUNK, 14, 15)
 _BLOCK = 2**20
 # No recorder makes records or chunks of this size.
 _MOST = 2**28
@@ -167,7 +169,7 @@ class McapSalvage:
 
     def _ends_well(self, source: Source, record: Record) -> bool:
         """Whether the length of a record without a checksum can be right: the next one or its content say so."""
-        if record.opcode in (_SCHEMA, _CHANNEL, _CHUNK, _FOOTER) or record.end == source.size:
+        if record.opcode in _SURE or record.end == source.size:
             return True
         return _record_at(source, record.end) is not None or (
             record.opcode == _MESSAGE and self._believable(source, record)
