@@ -491,7 +491,7 @@ def test_a_name_of_a_picture_that_cannot_be_drawn_is_refused_before_anything_is_
 
 def test_a_system_that_cannot_be_solved_ends_with_status_1(monkeypatch, capsys):
     broken = with_law(limb_of("reference_joint_tendon"), "tendon", SPRING, {})
-    monkeypatch.setattr(structure, "load_limb", lambda path: broken)
+    monkeypatch.setattr(structure, "load_limb", lambda path, allow_laws: broken)
     monkeypatch.setenv("COLUMNS", "100")
     assert limb_structure("broken.yaml") == 1
     assert "F_T (tendon_force) is defined more than once: by 2.53, spring" in capsys.readouterr().out
