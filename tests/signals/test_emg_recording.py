@@ -102,7 +102,7 @@ def test_byte_order_mark_and_latin_text_are_read(write):
         ),
         ("RF\n" + "1" * 200_000, 1000.0, "no rows below the header"),
         ("R" * 200_000 + "\n1", 1000.0, "line 2: holds 1 column (delimiter"),
-        ("RF\n1\n" + "x" * 1000, 1000.0, "xxx...; a finite number"),
+        ("RF\n1\n" + "x" * 1000, 1000.0, "xxx...xxx"),
         (b"RF\0\0\n", 1000.0, "is no text file"),
         (CHANNELS.replace("from 50 to 1000 samples per second", ""), None, "the header states no samples per second"),
         (CHANNELS[: CHANNELS.index("0.1")], None, "no rows below the header"),

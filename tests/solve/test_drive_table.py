@@ -84,7 +84,7 @@ def test_a_law_that_no_polynomial_follows(tmp_path):
     start, end = text.index("    force_frequency:"), text.index("    passive_force:")
     (tmp_path / "crooked_law.py").write_text(LAW)
     (tmp_path / "limb.yaml").write_text(text[:start] + "    force_frequency: crooked_law:crooked\n" + text[end:])
-    model = WholeModel(load_limb(tmp_path / "limb.yaml"))
+    model = WholeModel(load_limb(tmp_path / "limb.yaml", allow_laws=True))
     given = inputs(model)
     np.testing.assert_allclose(model.drives(given), by_law(model, given), rtol=0, atol=2e-12)
 

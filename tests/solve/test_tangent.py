@@ -323,7 +323,7 @@ def test_an_equation_of_parameters_alone_is_not_compiled(tmp_path):
     """It may use what compiled code may not; its law then moves the limb as one that has the number itself."""
     (tmp_path / "loaded.py").write_text(LOADED, encoding="utf-8")
     (tmp_path / "limb.yaml").write_text((PARAMS / "reference_joint.yaml").read_text(encoding="utf-8"), encoding="utf-8")
-    limb = load_limb(tmp_path / "limb.yaml")
+    limb = load_limb(tmp_path / "limb.yaml", allow_laws=True)
     ends = []
     for law in ({"law": "loaded:tabulated"}, {"law": "quadratic", "slack_length": 0.8}, {"law": "quadratic"}):
         changed = with_values(limb, {"unit_kinds.slow.passive_force": law})
