@@ -326,7 +326,7 @@ def test_an_equation_of_parameters_alone_is_not_compiled(tmp_path):
     limb = load_limb(tmp_path / "limb.yaml", allow_laws=True)
     ends = []
     for law in ({"law": "loaded:tabulated"}, {"law": "quadratic", "slack_length": 0.8}, {"law": "quadratic"}):
-        changed = with_values(limb, {"unit_kinds.slow.passive_force": law})
+        changed = with_values(limb, {"unit_kinds.slow.passive_force": law}, allow_laws=True)
         ends.append(WholeModel(changed).simulate(np.full((11, 2), 0.5), 100.0).angle[-1, 0])
     assert ends[0] == pytest.approx(ends[1], rel=1e-12)
     assert ends[2] != pytest.approx(ends[1], rel=1e-6)
