@@ -9,6 +9,7 @@ import resource
 import sys
 import threading
 import traceback
+import warnings
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
@@ -53,7 +54,8 @@ def guarded(work: Callable[[], int], line: Callable[[UserError], str] = str) -> 
     """
     _fill_descriptors()
     sys.stdout, sys.stderr = sys.stdout or _nowhere(), sys.stderr or _nowhere()
-    hooks = threading.excepthook, sys.unraisablehook
+    hooks = threading.excepthook, sys.unraisablehook, warnings.formatwarning
+    warnings.formatwarning = format_warning
     threading.excepthook = lambda given: _say(*told(given.exc_value or MemoryError()))
     sys.unraisablehook = lambda given: _say(*told(given.exc_value or MemoryError()))
     try:
@@ -65,7 +67,7 @@ def guarded(work: Callable[[], int], line: Callable[[UserError], str] = str) -> 
                 written = _status_of(_flushed, str)
             return status or written
     finally:
-        threading.excepthook, sys.unraisablehook = hooks
+        threading.excepthook, sys.unraisablehook, warnings.formatwarning = hooks
 
 
 def _status_of(work: Callable[[], int], line: Callable[[UserError], str]) -> int:
@@ -85,7 +87,16 @@ def _status_of(work: Callable[[], int], line: Callable[[UserError], str]) -> int
 
 def excepthook(kind: type[BaseException], error: BaseException, trace: Any) -> None:
     """For `sys.excepthook`: end with one line and the exit status for what a program raises while it is imported."""
-    raise SystemExit(_say(*told(error)))
+
+    def work() -> int:
+        raise error
+
+    raise SystemExit(_status_of(work, str))
+
+
+def format_warning(message: Warning | str, *_: Any, **__: Any) -> str:
+    """A line for a warning of a library, for `warnings.formatwarning`: the first of its own, without its place."""
+    return f"limb: warning: {clean(next(iter(str(message).splitlines()), ''))}\n"
 
 
 def told(error: BaseException) -> tuple[str, int]:
@@ -106,14 +117,12 @@ def told(error: BaseException) -> tuple[str, int]:
         return f"{text}; a complete installation is needed", 2
     if type(error).__module__.split(".")[0] == "rclpy":
         return f"ROS 2: {_ROS_PLACE.sub('', text)}", 2
-    where = next((f" ({place})" for place in reversed(_places(error))), "")
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if _PACKAGE in Path(frame.filename).parents]
+    if own and any(frame.name == "<module>" for frame in frames[frames.index(own[-1]) + 1 :]):
+        return f"a library cannot be loaded: {text}; it, or what the environment sets for it, is to be put right", 2
+    where = f" ({Path(own[-1].filename).relative_to(_PACKAGE)}:{own[-1].lineno})" if own else ""
     return f"a fault of limb: {type(error).__name__}: {text}{where}; please report it, with what {DEBUG}=1 shows", FAULT
-
-
-def _places(error: BaseException) -> list[str]:
-    """Where in this package an exception has passed."""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if _PACKAGE in Path(frame.filename).parents]
-    return [f"{Path(frame.filename).relative_to(_PACKAGE)}:{frame.lineno}" for frame in frames]
 
 
 def _say(text: str, status: int) -> int:

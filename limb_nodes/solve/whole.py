@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from types import ModuleType
 from typing import Any
@@ -20,7 +20,8 @@ from limb_nodes.solve.compile import compiled
 from limb_nodes.solve.course import Course, Input, Stretch, stretches
 from limb_nodes.solve.data import data_type
 from limb_nodes.solve.drive_table import DriveTable
-from limb_nodes.solve.integrate import difference_slopes
+from limb_nodes.solve.failure import FAILURES, SolveError, where
+from limb_nodes.solve.integrate import NOT_FINITE, difference_slopes
 from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import pieces
 from limb_nodes.solve.problem import give_inputs, new_problem
@@ -57,6 +58,12 @@ class Movement:
     muscle: dict[str, FloatArray]
     unit: dict[str, FloatArray]
     steps: tuple[int, int]
+
+    def until(self, row: int) -> Movement:
+        """Its first rows."""
+        cut: dict[str, Any] = {name: value[:row] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        muscle, unit = ({name: value[:row] for name, value in of.items()} for of in (self.muscle, self.unit))
+        return replace(self, **cut, muscle=muscle, unit=unit)
 
 
 class WholeModel:
@@ -251,7 +258,18 @@ class WholeModel:
             given = excitation[done : done + len(states)]
             done += len(states)
             if len(states):
-                yield self._movement(stretch, states, given, seen if observe else (), course.steps)
+                movement = self._movement(stretch, states, given, seen if observe else (), course.steps)
+                # Finite states may have a rate that is not, which no step has met.
+                unknown = np.flatnonzero(~np.isfinite(movement.acceleration).all(axis=1))
+                if unknown.size:
+                    if unknown[0]:
+                        yield movement.until(unknown[0])
+                    at, data = float(movement.time[unknown[0]]), self.new_data(period)
+                    data.first[0] = stretch.first
+                    part = where(self, NOT_FINITE, at, states[unknown[0]], stretch.inputs, data)
+                    text = f"the solution stops at {at:.6g} s: {FAILURES[NOT_FINITE]}{part}"
+                    raise SolveError(f"{self.limb.file}: {text}")
+                yield movement
         if course.failure is not None:
             raise course.failure
 

@@ -231,7 +231,7 @@ def _watched(seed: int, first: int, count: int) -> Iterator[Trial]:
                 return
         if used < math.inf:
             yield Trial(f"{KIND} {seed} {number}: ended with status {child.wait()}", traceback=True)
-        elif child.wait():
+        elif child.wait() and number == first:
             raise RuntimeError(f"{' '.join(command)} ended with status {child.returncode}")
     finally:
         child.kill()
