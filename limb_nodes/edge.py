@@ -29,7 +29,9 @@ _PACKAGE = Path(__file__).parent
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 _SHORT = {errno.ENOMEM, errno.EAGAIN, errno.EMFILE, errno.ENFILE}
 _NEEDED = "more memory, processes or files are needed than the system allows (see ulimit -a)"
-_SHORT_WORDS = re.compile("cannot allocate memory|start new thread|failed to map segment", re.IGNORECASE)
+_SHORT_WORDS = re.compile(
+    "cannot allocate memory|start new thread|failed to map segment|too many open files", re.IGNORECASE
+)
 # The place in the source of ROS, which its errors end with.
 _ROS_PLACE = re.compile(r",? at /\S+:\d+")
 

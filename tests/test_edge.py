@@ -57,6 +57,7 @@ def run(*arguments: str, shell: str = "", **environment: str) -> subprocess.Comp
         (PermissionError(errno.EACCES, "Permission denied", b"a\xff"), 2, "a\\udcff: Permission denied"),
         (MemoryError(), 1, "MemoryError; more memory, processes or files"),
         (np.linalg.LinAlgError("Singular matrix"), FAULT, "a fault of limb: LinAlgError: Singular matrix"),
+        (RuntimeError("epoll: Too many open files"), 1, "Too many open files; more memory, processes or files"),
         (RuntimeError("can't start new thread"), 1, "can't start new thread; more memory, processes or files"),
         (ImportError("x.so: failed to map segment from shared object"), 1, "more memory, processes or files"),
         (UnicodeEncodeError("utf-8", "a\udcff", 1, 2, "surrogates"), 2, "'a\\udcff' cannot be written as UTF-8"),
@@ -85,6 +86,22 @@ def test_a_fault_of_the_program_names_its_place_and_can_be_traced(
     assert said.startswith("Traceback")
     assert f"{DEBUG}=1 shows" in said.splitlines()[-1]
     assert "(edge.py:" in said.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("environment", "status", "part"),
+    [
+        ({"NUMBA_NUM_THREADS": "0"}, 2, "limb: error: a library cannot be loaded: Number of threads"),
+        ({"NUMBA_OPT": "nonsense"}, 0, "limb: warning: Environment variable 'NUMBA_OPT' is defined"),
+    ],
+    ids=str,
+)
+def test_what_the_environment_sets_for_a_library(environment: dict[str, str], status: int, part: str) -> None:
+    done = run("muscle", str(ROOT / "params" / "reference_joint.yaml"), "flexor", "--duration", "0.01", **environment)
+    assert done.returncode == status
+    assert part in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("shell", [">/dev/full", ">&-", ">&- 2>&-", "2>/dev/full", "<&-", "<&- >&- 2>&-"])
