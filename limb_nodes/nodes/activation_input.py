@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from limb_nodes.errors import FieldError, UserError
+from limb_nodes.errors import FieldError, UserError, clean
 from limb_nodes.exchange.activations import ActivationPart
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.nodes.base import LimbNode
@@ -45,7 +45,7 @@ class ActivationInput(LimbNode):
             self.source = load_activation(source, self.muscles, self.ticks.rate, duration or None)
             final = len(self.source.values) - 1
             for note in self.source.notes:
-                self.get_logger().info(note)
+                self.get_logger().info(clean(note))
         elif self.mode == "lockstep":
             raise UserError(
                 "activation_input: the parameter source is empty; in mode lockstep a bag, CSV, waveform YAML or "

@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Header
 
-from limb_nodes.errors import RunError, UserError
+from limb_nodes.errors import RunError, UserError, clean
 from limb_nodes.exchange.identity import FORM, is_identity
 from limb_nodes.exchange.part import Part
 from limb_nodes.exchange.recorded import RecordedRun
@@ -199,7 +199,7 @@ class LimbNode(Node):
         now = time.monotonic()
         if now - self._last_complaint >= 1.0:
             self._last_complaint = now
-            self.get_logger().warning(f"{what}; it is not taken ({self.refused} so far)")
+            self.get_logger().warning(f"{clean(what)}; it is not taken ({self.refused} so far)")
             self.diagnose(what, bad=True)
 
     @property

@@ -11,6 +11,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
+from limb_nodes.errors import clean
 from limb_nodes.nodes.live_readers import EnvelopeReader, RawReader
 from limb_nodes.nodes.live_settings import HEARD, NEVER_CAME, SILENT
 from limb_nodes.nodes.messages import type_name
@@ -85,7 +86,7 @@ class LiveSource:
         self._looked = now
         if self.age >= self._silence and not self.silent:
             self.silent = True
-            self._node.get_logger().warning(self.told())
+            self._node.get_logger().warning(clean(self.told()))
             self.report()
 
     def report(self) -> None:
