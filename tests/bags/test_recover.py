@@ -160,6 +160,23 @@ def test_damage_costs_the_chunks_in_which_it_is(place: float, width: int, tmp_pa
     assert metadata["rosbag2_bagfile_information"]["message_count"] == len(ticks) + 1
 
 
+@pytest.mark.parametrize("cut", [0, 400])
+def test_parts_of_recorders_that_went_on_belong_to_the_bag(cut: int, tmp_path: Path) -> None:
+    source = tmp_path / "run"
+    for folder, first, end in (source, 0, 200), (tmp_path / "run.part1", 150, 300), (tmp_path / "run.part2", 290, 310):
+        with BagWriter(folder, {"seed": 1}) as bag:
+            for tick in range(first, end):
+                bag.write("activation", tick, make_message(TOPIC_TYPES["activation"], tick, tick=tick))
+        file = next(folder.glob("*.mcap"))
+        file.write_bytes(file.read_bytes()[: -cut or None])
+        (folder / "metadata.yaml").unlink()
+    (tmp_path / "run.partly").mkdir()
+    result = recover(source, tmp_path / "out")
+    assert result.counts == {"/run_info": 1, "/activation": 310}
+    with BagReader(tmp_path / "out") as bag:
+        np.testing.assert_array_equal(bag.table("activation")["tick"], np.arange(310))
+
+
 def test_a_whole_bag_is_copied(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "whole", {"seed": 1}) as bag:
         bag.write("joint_states", 9, make_message(TOPIC_TYPES["joint_states"], 9, name=["knee"], position=[1.0]))

@@ -398,7 +398,7 @@ def trial(sample: Sample, work: Path, seed: int) -> Trial:
 
 
 # Longer than any bag of this size may take (s), pictures aside.
-HUNG = 15.0
+HUNG = 5.0
 
 
 def touches(mutation: Mutation, place: tuple[int, int]) -> bool:
