@@ -15,7 +15,10 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 # Files that take minutes: they come first, so that no process is left with one of them when the others are done.
-LONG = ("docs/test_blocks.py", "graph/test_ending.py", "graph/test_lockstep.py")
+LONG = (
+    *("docs/test_blocks.py", "graph/test_ending.py", "graph/test_identity.py", "graph/test_lockstep.py"),
+    *("graph/test_resuming.py", "graph/test_sources.py"),
+)
 DOMAINS = 101
 
 # The same examples every time, however long one takes.
