@@ -96,6 +96,15 @@ def excepthook(kind: type[BaseException], error: BaseException, trace: Any) -> N
     raise SystemExit(_status_of(work, str))
 
 
+def as_program() -> None:
+    """Tell whatever goes wrong while the rest of a program is imported in one line.
+
+    Raises UserError for limits of the system that are too narrow.
+    """
+    sys.excepthook, warnings.formatwarning = excepthook, format_warning
+    check_limits()
+
+
 def format_warning(message: Warning | str, *_: Any, **__: Any) -> str:
     """A line for a warning of a library, for `warnings.formatwarning`: the first of its own, without its place."""
     return f"limb: warning: {clean(next(iter(str(message).splitlines()), ''))}\n"

@@ -207,8 +207,8 @@ class LimbPart(Part):
 
     @property
     def done(self) -> int:
-        """The tick that the limb is at."""
-        return self.tick
+        """The tick that the limb is at, and one more once all nodes are known to be there: the recorder has said so."""
+        return self.tick + (self.awaits_recorder and self.begun)
 
     def awaited(self) -> str:
         """The torque of this tick, or the recorder."""

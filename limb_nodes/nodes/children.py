@@ -24,7 +24,10 @@ from limb_nodes.nodes.settings import RunSettings
 ENDING = 60.0
 ERROR = "limb: error: "
 # A child imports from where its parent does: `python -m` and `-c` look in the working folder before all others.
-START = "import sys; sys.path[:] = {path!r}; from limb_nodes.nodes.{name} import main; main()"
+START = (
+    "import sys; sys.path[:] = {path!r}; from limb_nodes.edge import as_program; as_program(); "
+    "from limb_nodes.nodes.{name} import main; main()"
+)
 # The order in which nodes are ended: the recorder last.
 ENDED = ("activation_input", "limb_dynamics", "muscle_stack", "recorder")
 

@@ -70,9 +70,12 @@ def trial(
     while child.poll() is None and not any(path.stat().st_size > 20_000 for path in out.glob("*.mcap")):
         time.sleep(0.005)
     time.sleep(after)
-    pid = process(child, victim)
     begun = reached(out)
-    os.kill(pid, signal.SIGKILL)
+    try:
+        os.kill(process(child, victim), signal.SIGKILL)
+    except (OSError, StopIteration):  # the run was over
+        child.communicate()
+        return trial(out.with_name(f"{out.name}_again"), environment, whole, victim, after / 2, respawn)
     killed = time.monotonic()
     _, said = child.communicate()
     seconds = time.monotonic() - killed

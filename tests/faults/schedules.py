@@ -110,15 +110,13 @@ def judged(run: Run) -> Trial:
     conflicts = sum(part.conflicts for part in parts)
     missing = sum(bag.part.missing() for bag in run.bags)
     stuck = any(process.waits for process in run.everyone)
-    # Of nodes that were started by hand nobody is left to say that one is stopped.
-    last = run.schedule.mode == ALONE and all(part.finished for part in parts)
     return Trial(
         what=f"python -m tests.faults schedules --trials 1 --seed {run.schedule.seed}",
         lost=max((bag.lost for bag in run.bags), default=0.0),
         changed=(wrong and not conflicts) or (short and not (failed or missing or conflicts)),
         said=run.said,
         traceback=bool(run.tracebacks),
-        hung=stuck or (run.silent > SILENCE and not last),
+        hung=stuck or run.silent > SILENCE,
     )
 
 

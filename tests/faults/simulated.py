@@ -252,7 +252,9 @@ class Process:
         self.look_done()
         if self.part.finished and self.finished_at is None:
             self.finished_at = self.run.now
-            self._leave()
+            # Whoever is started anew may need what it has sent.
+            if self.run.schedule.mode != RESPAWN or self.name == "recorder":
+                self._leave()
 
     def look_done(self) -> None:
         """Notice whether it has gone on."""
@@ -310,8 +312,10 @@ class Process:
 
     def stop(self) -> None:
         self.stopped = True
+        self.run.look_around()
 
     def go_on(self) -> None:
+        self.run.look_around()
         self.stopped = False
         waiting, self._waiting = self._waiting, deque()
         for what in waiting:
@@ -503,8 +507,7 @@ class Run:
 
     def start(self, name: str, resume: str = "") -> None:
         """Start a node's process; resume: the bag that it goes on from."""
-        if not any(process.alive for process in self.processes.values()):
-            self.progress()
+        self.look_around()
         part = self.part_of(name)
         found = list(self.files.get(resume, ()))
         if resume:
@@ -644,6 +647,16 @@ class Run:
         self._note_silence()
         self._moved, self._word = self.now, False
 
+    def look_around(self) -> None:
+        """If nobody is there who could say anything, nothing is to be said until somebody is.
+
+        A parent speaks for those who are stopped; of nodes that were started by hand nobody does.
+        """
+        deaf = self.schedule.mode == ALONE
+        if not any(one.alive and not (deaf and one.stopped) for one in self.processes.values()):
+            self.progress()
+            self._word = True
+
     def _note_silence(self) -> None:
         if not self._word and not any(process.told and process.alive for process in self.processes.values()):
             allowed = 0.0 if any(process.waits for process in self.processes.values()) else self.unsaid
@@ -652,9 +665,7 @@ class Run:
     def left(self, process: Process) -> None:
         """A process is gone; its parent notices."""
         self.gone.append(process)
-        if not any(other.alive for other in self.processes.values()):
-            self.progress()
-            self._word = True
+        self.look_around()
         if self.schedule.mode != ALONE and process.status != -9 and (process.status or process.name == "recorder"):
             self.after(TURN, self.end_all)
 
