@@ -15,7 +15,7 @@ class RecordingPart(Part):
     """Takes each tick of each topic once.
 
     expected: topic -> every how many ticks it should have a message. counts: topic -> messages taken. last_tick: of the
-    run, -1 while it is not known.
+    run, -1 while it is not known. ready: whether all other nodes are known to be there.
     """
 
     def __init__(self, *given: Any, **options: Any) -> None:
@@ -23,6 +23,7 @@ class RecordingPart(Part):
         self.expected = {topic: every for topic, every in expected_topics({}).items() if topic not in STATES}
         self.counts = dict.fromkeys(SENDERS, 0)
         self.last_tick = -1
+        self.ready = False
         self._new: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in SENDERS}
         for topic in SENDERS:
             self.takes(topic, partial(self.on_message, topic), gaps=True)
@@ -80,8 +81,8 @@ class RecordingPart(Part):
 
     @property
     def done(self) -> int:
-        """The newest tick that is there on every topic."""
-        return self.complete
+        """How many ticks are there on every topic, and one more once all nodes are known to be there."""
+        return self.complete + 1 + self.ready
 
     def awaited(self) -> str:
         """What is missing of the next tick."""

@@ -160,6 +160,7 @@ class Recorder(LimbNode):
     def open(self) -> None:
         """Make the bag, write what has come so far, and say that the run may start."""
         self.part.expect_states(self.parameters.get("muscle_stack", {}))
+        self.part.ready = set(self.parameters) >= set(NODES)
         self.writer = BagWriter(self.path, self.run_info(), namespace=self.get_namespace(), latched=LATCHED_TOPICS)
         reports = ("/diagnostics",) if self.mode == "realtime" else ()
         self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.part.expected, *reports)})

@@ -372,7 +372,7 @@ class RecorderProcess(Process):
             self.run.after(self.run.random.uniform(0.0, POLL), partial(self.do, self._poll))
 
     def _open(self) -> None:
-        self.opened = True
+        self.opened = self.part.ready = True
         self.part.expect_states({"state_every": self.run.schedule.state_every})
         if self.resume:
             last = self.part.complete
