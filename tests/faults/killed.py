@@ -69,8 +69,10 @@ def trial(
     child = run(out, environment, *(["--respawn"] if respawn else []))
     while child.poll() is None and not any(path.stat().st_size > 20_000 for path in out.glob("*.mcap")):
         time.sleep(0.005)
+    if not out.exists():
+        raise RuntimeError(f"the run has not begun: {child.communicate()[1]}")
     time.sleep(after)
-    begun = reached(out)
+    begun, nodes = reached(out), children_of(child)
     try:
         os.kill(process(child, victim), signal.SIGKILL)
     except (OSError, StopIteration):  # the run was over
@@ -79,6 +81,9 @@ def trial(
     killed = time.monotonic()
     _, said = child.communicate()
     seconds = time.monotonic() - killed
+    # Nodes whose parent was killed end by themselves, and close the bag before.
+    while any(Path(f"/proc/{pid}").exists() for pid in nodes):
+        time.sleep(0.01)
     closed = (out / "metadata.yaml").exists()
     if not closed:
         recover(out, out.with_name(f"{out.name}_recovered"))
@@ -105,9 +110,16 @@ def process(child: subprocess.Popen[str], victim: str) -> int:
     """The process of a run, or of one of its nodes."""
     if victim not in NODES:
         return child.pid
-    children = Path(f"/proc/{child.pid}/task/{child.pid}/children").read_text().split()
     module = f"limb_nodes.nodes.{victim} ".encode()
-    return next(int(pid) for pid in children if module in Path(f"/proc/{pid}/cmdline").read_bytes())
+    return next(pid for pid in children_of(child) if module in Path(f"/proc/{pid}/cmdline").read_bytes())
+
+
+def children_of(child: subprocess.Popen[str]) -> list[int]:
+    """The processes of the nodes of a run; none if it is over."""
+    try:
+        return [int(pid) for pid in Path(f"/proc/{child.pid}/task/{child.pid}/children").read_text().split()]
+    except OSError:
+        return []
 
 
 def reached(out: Path) -> int:
