@@ -10,9 +10,9 @@ import pytest
 from std_msgs.msg import String
 
 from limb_nodes.model import load_limb
+from limb_nodes.model.urdf import urdf
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
 from limb_nodes.nodes.qos import LATCHED
-from limb_nodes.nodes.urdf import urdf
 
 PARAMS = Path(__file__).resolve().parents[2] / "params"
 LIMBS = [path for path in sorted(PARAMS.glob("*.yaml")) if "\nsegments:" in path.read_text()]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from xml.etree import ElementTree as xml
 
-from limb_nodes.model import Limb, Segment
+from limb_nodes.model.limb import Limb, Segment
 
 WIDTH = 0.04
 
@@ -20,6 +20,7 @@ def urdf(limb: Limb) -> str:
         add_joint(robot, segment, parent, origin)
         add_link(robot, segment)
         parent, origin = segment.name, (segment.length, 0.0, 0.0)
+    xml.indent(robot)
     return xml.tostring(robot, encoding="unicode")
 
 
