@@ -1,4 +1,4 @@
-# What a prefix needs besides the Python package: the nodes as `ros2 run` looks for them, and params/.
+# What a prefix needs besides the Python package: the nodes as `ros2 run` looks for them, launch files, and params/.
 # Read by colcon's build (CMakeLists.txt beside this file) and by pip's (msgs/wheel.cmake).
 # Each node is a module limb_nodes.nodes.<node> with a function main().
 foreach(node activation_input muscle_stack limb_dynamics recorder)
@@ -14,3 +14,4 @@ main()
   install(PROGRAMS "${CMAKE_CURRENT_BINARY_DIR}/${node}" DESTINATION lib/limb_nodes)
 endforeach()
 install(DIRECTORY "${CMAKE_CURRENT_LIST_DIR}/../params" DESTINATION share/limb_nodes)
+install(DIRECTORY "${CMAKE_CURRENT_LIST_DIR}/launch" DESTINATION share/limb_nodes)

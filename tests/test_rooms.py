@@ -70,7 +70,7 @@ def test_every_room_imports_only_what_stands_below_it() -> None:
 def test_every_folder_is_a_room_and_contributing_names_it() -> None:
     table = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     for path in (ROOT / "limb_nodes").iterdir():
-        if path.is_dir() and any(path.glob("*.py")):
+        if (path / "__init__.py").exists():
             assert path.name in BELOW
             assert f"{path.name}/`" in table
 
