@@ -1,4 +1,4 @@
-"""The part of activation_input: on joint_states k it sends activation k + 1, and activation 0 before it."""
+"""The part of activation_input: on limb_state k it sends activation k + 1, and activation 0 before it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ActivationPart(Part):
         self.activation = self.sends("activation")
         self.final = final
         self.tell_final()
-        self.takes("joint_states", self.on_joint_states, gaps=self.realtime)
+        self.takes("limb_state", self.on_limb_state, gaps=self.realtime)
 
     def tell_final(self) -> None:
         """Let the messages tell the last tick."""
@@ -41,7 +41,7 @@ class ActivationPart(Part):
         self.final = following if self.final is None else min(self.final, following)
         self.tell_final()
 
-    def on_joint_states(self, tick: int, _: bytes) -> None:
+    def on_limb_state(self, tick: int, _: bytes) -> None:
         """Send what this tick and the next one need."""
         self.now, last = tick, tick + 1
         self.before(tick)
@@ -64,5 +64,5 @@ class ActivationPart(Part):
         return self.now
 
     def awaited(self) -> str:
-        """The joint states of the next tick."""
-        return "" if self.finished else f"joint_states of tick {self.now + 1} from limb_dynamics"
+        """The limb's state at the next tick."""
+        return "" if self.finished else f"limb_state of tick {self.now + 1} from limb_dynamics"

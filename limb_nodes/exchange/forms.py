@@ -14,7 +14,7 @@ import numpy as np
 
 from limb_nodes.bags.columns import MessageLayout
 from limb_nodes.bags.types import limb_typestore, make_message
-from limb_nodes.exchange.identity import LENGTH, TEXT
+from limb_nodes.exchange.identity import BYTES, LENGTH, bytes_of
 from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.model import Limb
 from limb_nodes.model.layout import build_layout
@@ -23,20 +23,29 @@ from limb_nodes.solve.fits import OTHER_FORM, OTHER_NUMBERS, fits
 from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, UNIT_FIELDS
 
 DOUBLE, TICK = np.dtype("<f8"), struct.Struct("<q")
+# Stands in an example where messages have the identity of their run.
+NOBODY = "0" * LENGTH
+# The frame of the limb's base, the root of its URDF.
+BASE = "base"
 
 
 class Form:
     """The messages of a topic of one limb.
 
-    data: an example, in CDR. numbers: field -> its place, type and shape, of fields that hold numbers.
+    data: an example, in CDR. numbers: field -> its place, type and shape, of fields that hold numbers. run: where the
+    identity of the run stands, as `bytes_of` gives it; nowhere in messages of a type that has no field for it.
     """
 
-    def __init__(self, topic: str, fields: Mapping[str, Any], share: bool = False) -> None:
-        """share: its numbers are from 0 to 1."""
+    def __init__(self, topic: str, fields: Mapping[str, Any], *, frame: str = "", share: bool = False) -> None:
+        """frame: of the header. share: its numbers are from 0 to 1."""
         self.topic, self.type = topic, TOPIC_TYPES[topic]
         message = make_message(self.type, 0, **fields)
-        message.header.frame_id = "0" * LENGTH
+        message.header.frame_id = frame
+        if hasattr(message, "run"):
+            message.run = NOBODY
         data = bytes(limb_typestore().serialize_cdr(message, self.type))
+        start = data.find(bytes_of(NOBODY))
+        self.run = slice(start, start + BYTES) if start >= 0 else slice(0, 0)
         layout = MessageLayout(data, limb_typestore())
         layout.message(self.type, "")
         # What may follow is no part of the message, and readers of bags refuse it.
@@ -46,7 +55,7 @@ class Form:
             for name, (start, dtype, shape) in layout.numbers.items()
         }
         # Whoever receives a message has looked at its identity.
-        constant = [np.arange(a, b) for a, b in layout.constant if (a, b) != (TEXT.start, TEXT.stop)]
+        constant = [np.setdiff1d(np.arange(a, b), np.arange(self.run.start, self.run.stop)) for a, b in layout.constant]
         doubles = [start + 8 * np.arange(count) for start, dtype, _, count in self.numbers.values() if dtype == DOUBLE]
         self._example = np.frombuffer(self.data, dtype=np.uint8)
         self._constant, self._doubles = (np.concatenate([np.empty(0, np.int64), *all_]) for all_ in (constant, doubles))
@@ -93,7 +102,7 @@ def forms_of(limb: Limb) -> dict[str, Form]:
     corner = make_message("geometry_msgs/msg/Point")
     fields: dict[str, dict[str, Any]] = {
         "activation": {"name": muscles, **zeros(["activation"], len(muscles))},
-        "joint_states": {"name": joints, **zeros(["position", "velocity"], len(joints))},
+        "limb_state": {"joint": joints, **zeros(["angle", "velocity"], len(joints))},
         "joint_torque": {
             "joint": joints,
             **zeros(["torque", "slope_angle", "slope_velocity", "slope_time"], len(joints)),
@@ -101,7 +110,8 @@ def forms_of(limb: Limb) -> dict[str, Form]:
         "movement_pattern": {
             "joint": joints,
             "point": points,
-            **zeros(["angle", "velocity", "acceleration"], len(joints)),
+            **zeros(["angle", "velocity", "acceleration", "torque", "command"], len(joints)),
+            "load": [0.0] * 3,
             "position": [corner] * len(points),
         },
         "muscle_state": {"name": muscles, **zeros(MUSCLE_FIELDS, len(muscles))},
@@ -110,7 +120,18 @@ def forms_of(limb: Limb) -> dict[str, Form]:
         "muscle_checkpoint": {"state": [0.0] * remembered},
         "limb_checkpoint": {"state": [0.0] * (4 * layout.joints + 4)},
     }
-    return {topic: Form(topic, names, share=topic == "activation") for topic, names in fields.items()}
+    frames = {"movement_pattern": BASE}
+    return {
+        topic: Form(topic, names, frame=frames.get(topic, ""), share=topic == "activation")
+        for topic, names in fields.items()
+    }
+
+
+def joint_states_form(limb: Limb, prefix: str = "") -> Form:
+    """The form of joint_states, which every tool of ROS knows; prefix: of the names of frames."""
+    names = limb.joint_names
+    fields = {"name": names, **zeros(["position", "velocity", "effort"], len(names))}
+    return Form("joint_states", fields, frame=f"{prefix}{BASE}")
 
 
 def zeros(fields: Sequence[str] | Mapping[str, Any], count: int) -> dict[str, list[float]]:

@@ -1,7 +1,6 @@
 """The identity of a run: its nodes agree on it before tick 0, and every message of the run carries it.
 
-It stands in `header.frame_id`, the one field that all these messages share; joint angles and torques have no frame.
-What carries another identity belongs to another run.
+It stands in the field `run`. What carries another identity belongs to another run.
 """
 
 from __future__ import annotations
@@ -12,9 +11,8 @@ import uuid
 
 LENGTH = 32
 FORM = f"{LENGTH} hexadecimal digits"
-# Where a serialised message that begins with a header holds the length of its frame_id, the text and the zero after it.
-FRAME = slice(12, 12 + 4 + LENGTH + 1)
-TEXT = slice(FRAME.start + 4, FRAME.stop)
+# How many bytes of a serialised message it takes: length, text, zero.
+BYTES = 4 + LENGTH + 1
 
 
 def new_identity() -> str:
@@ -27,12 +25,12 @@ def is_identity(text: str) -> bool:
     return re.fullmatch(f"[0-9a-f]{{{LENGTH}}}", text) is not None
 
 
-def frame_of(identity: str) -> bytes:
-    """The frame_id of a run's messages, as bytes of the message: length, text, zero."""
+def bytes_of(identity: str) -> bytes:
+    """An identity as bytes of a message: length, text, zero."""
     return struct.pack("<I", LENGTH + 1) + identity.encode() + b"\0"
 
 
-def identity_of(frame: bytes) -> str:
+def identity_of(data: bytes) -> str:
     """The identity in such bytes; empty if they hold none."""
-    text = frame[4:-1].decode("ascii", "replace")
-    return text if is_identity(text) and frame == frame_of(text) else ""
+    text = data[4:-1].decode("ascii", "replace")
+    return text if is_identity(text) and data == bytes_of(text) else ""

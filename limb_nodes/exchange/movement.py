@@ -1,4 +1,4 @@
-"""The part of limb_dynamics: it offers joint_states 0, then steps from tick to tick under the joint torques."""
+"""The part of limb_dynamics: it offers limb_state 0, then steps from tick to tick under the joint torques."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from limb_nodes.exchange.forms import joint_states_form
+from limb_nodes.exchange.held import Held
+from limb_nodes.exchange.outgoing import Outgoing
 from limb_nodes.exchange.part import Part
 from limb_nodes.exchange.past import Past
 from limb_nodes.exchange.stream import CHECKPOINT, RECORDER_LAG
@@ -22,20 +25,39 @@ MOST_AHEAD = 0.05
 
 
 class LimbPart(Part):
-    """From joint torques to joint states and the movement pattern.
+    """From joint torques to the limb's state and the movement pattern.
 
-    In lockstep joint_torque k leads to joint_states k + 1. In real time `step_to_now` does, at the pace of the wall
-    clock, with the newest torque; ticks whose torque is not there in time are counted.
+    In lockstep joint_torque k leads to limb_state k + 1. In real time `step_to_now` does, at the pace of the wall
+    clock, with the newest torque; ticks whose torque is not there in time are counted. The movement pattern and
+    joint_states of a tick are sent as soon as its torque is known.
 
     tick: that the limb is at. last_tick: of the run, -1 while it is not known. missed: deadlines. started_at: when real
     time began (s of the monotonic clock). recorded: the newest tick that the recorder has, -1 before. again: whether it
-    goes on from what is recorded.
+    goes on from what is recorded. joint_states: messages for everybody. command, load: what acts from outside.
+    commanded: the newest tick that a command answers, -1 before.
     """
 
-    def __init__(self, *given: Any, awaits_recorder: bool = False, **options: Any) -> None:
+    def __init__(
+        self,
+        *given: Any,
+        awaits_recorder: bool = False,
+        command_every: int = 0,
+        command_timeout: float = 0.0,
+        load_timeout: float = 0.0,
+        frame_prefix: str = "",
+        **options: Any,
+    ) -> None:
+        """command_every: in lockstep, wait for a command every so many ticks; 0: never. frame_prefix: of joint_states.
+
+        command_timeout, load_timeout: how long a command or a load acts (s of simulation time); 0 for ever.
+        """
         super().__init__(*given, **options)
-        self.awaits_recorder = awaits_recorder
+        self.awaits_recorder, self.command_every = awaits_recorder, command_every
+        self.joint_states = Outgoing(joint_states_form(self.limb, frame_prefix), self.ticks.nanoseconds)
+        self.commanded = self.shown = -1
         self.stepper = LimbStepper(self.limb)
+        self.command = Held(self.stepper.command, self.in_ticks(command_timeout))
+        self.load = Held(self.stepper.load, self.in_ticks(load_timeout))
         self.tick = 0
         self.begun = self.again = False
         self.most_ahead = max(1, round(MOST_AHEAD / self.ticks.period))
@@ -48,21 +70,25 @@ class LimbPart(Part):
         self.history: OrderedDict[int, tuple[FloatArray, FloatArray]] = OrderedDict()
         self.started_at: float | None = None
         self.last_tick = -1
-        self.joint_states, self.pattern = self.sends("joint_states"), self.sends("movement_pattern")
+        self.state, self.pattern = self.sends("limb_state"), self.sends("movement_pattern")
         self.checkpoint = self.sends("limb_checkpoint")
         self.takes("joint_torque", self.on_torque, gaps=self.realtime)
 
+    def in_ticks(self, seconds: float) -> int:
+        """A time in ticks, 1 at least; 0 stays 0."""
+        return max(1, round(seconds / self.ticks.period)) if seconds else 0
+
     def begin(self) -> None:
-        """Offer the first joint states, unless the recorder is to be there first."""
+        """Offer the first state, unless the recorder is to be there first."""
         if not self.awaits_recorder:
             self.offer()
 
     def offer(self) -> None:
-        """Send the joint states of the current tick."""
+        """Send the state at the current tick."""
         self.begun = True
-        values = self.joint_states.values
-        values["position"][:], values["velocity"][:] = self.stepper.angle, self.stepper.velocity
-        self.joint_states.publish(self.tick)
+        values = self.state.values
+        values["angle"][:], values["velocity"][:] = self.stepper.angle, self.stepper.velocity
+        self.state.publish(self.tick)
         if self.tick % CHECKPOINT == 0:
             self.send_checkpoint()
 
@@ -70,7 +96,7 @@ class LimbPart(Part):
         """The recorder has every tick up to this one; -1 when it is ready."""
         # The recorder may have ticks that are done again.
         if tick < self.recorded or (tick > self.tick and not self.again):
-            self.refuse(f"recorder_progress: tick {tick} is not from {self.recorded} to {self.tick}")
+            self.refuse(f"recorded: tick {tick} is not from {self.recorded} to {self.tick}")
             return
         self.recorded = tick
         if not self.begun:
@@ -89,13 +115,34 @@ class LimbPart(Part):
             self.go_on()
             return
         self.newest = tick, rows
+        if tick == self.tick:
+            self.show(rows)
         if self.behind:
             self.catch_up(int(self.elapsed()))
 
     def go_on(self) -> None:
         """In lockstep, step as far as torques are there and the recorder is near."""
         while self.pending and self.begun and not self.finished and not self.ahead:
+            self.show(self.pending[0])
+            if self.uncommanded:
+                return
             self.step(self.pending.popleft())
+
+    def on_command(self, tick: int, torque: FloatArray) -> None:
+        """Take over a torque on the joints (N m), with which a controller answers joint_states of a tick."""
+        if self.command_every and not self.commanded <= tick <= self.tick:
+            self.refuse(f"joint_command: tick {tick} is not from {self.commanded} to {self.tick}")
+            return
+        self.command.take(torque, self.tick)
+        self.commanded = tick
+        if not self.realtime:
+            self.go_on()
+
+    @property
+    def uncommanded(self) -> bool:
+        """Whether the limb must wait for a command, which it does not at the last tick."""
+        due = self.command_every and self.tick % self.command_every == 0 and self.tick != self.last_tick
+        return bool(due) and not self.realtime and self.commanded < self.tick
 
     @property
     def ahead(self) -> bool:
@@ -164,13 +211,13 @@ class LimbPart(Part):
         return carried
 
     def step(self, rows: FloatArray) -> None:
-        """Send the movement pattern of this tick and go on to the next. Raises RunError."""
+        """Send the movement pattern of this tick, if it has not been, and go on to the next. Raises RunError."""
+        self.show(rows)
         self.finished = 0 <= self.last_tick <= self.tick
         if self.finished:
-            self.before_the_end()
-        self.send_pattern(self.stepper.acceleration(rows))
-        if self.finished:
             return
+        self.command.age(self.tick)
+        self.load.age(self.tick)
         if self.realtime:
             self.history[self.tick] = self.stepper.angle.copy(), self.stepper.velocity.copy()
             if len(self.history) > REMEMBERED:
@@ -178,6 +225,15 @@ class LimbPart(Part):
         self.stepper.step(rows, self.ticks.period)
         self.tick += 1
         self.offer()
+
+    def show(self, rows: FloatArray) -> None:
+        """Send the movement pattern and joint_states of this tick, once."""
+        if self.shown == self.tick:
+            return
+        self.shown = self.tick
+        if 0 <= self.last_tick <= self.tick:
+            self.before_the_end()
+        self.send_pattern(rows)
 
     def send_checkpoint(self) -> None:
         """Send all that the following ticks depend on."""
@@ -189,7 +245,12 @@ class LimbPart(Part):
         if past.limb is not None:
             self.tick, data = past.limb
             self.stepper.remember(self.values("limb_checkpoint", data, "state"))
+        patterns = past.messages["movement_pattern"]
         for tick in range(self.tick, past.tick + 1):
+            # A pattern tells what acted until its tick.
+            pattern = patterns[min(tick + 1, past.tick)]
+            self.stepper.command[:] = self.values("movement_pattern", pattern, "command")
+            self.stepper.load[:] = self.values("movement_pattern", pattern, "load")
             self.stepper.step(self.rows(past.messages["joint_torque"][tick]), self.ticks.period)
         self.tick = past.tick + 1
         self.again = True
@@ -197,13 +258,17 @@ class LimbPart(Part):
     def before_the_end(self) -> None:
         """What is to be said before the message with which the recording ends."""
 
-    def send_pattern(self, acceleration: FloatArray) -> None:
-        """Send angles, velocities, accelerations and points of this tick."""
-        values = self.pattern.values
-        values["angle"][:], values["velocity"][:] = self.stepper.angle, self.stepper.velocity
-        values["acceleration"][:] = acceleration
-        values["position"][:, :2] = points(self.limb, list(self.stepper.angle))
+    def send_pattern(self, rows: FloatArray) -> None:
+        """Send the movement of this tick under torque and slopes [4, n]."""
+        values, shown, stepper = self.pattern.values, self.joint_states.values, self.stepper
+        values["angle"][:], values["velocity"][:] = stepper.angle, stepper.velocity
+        values["acceleration"][:] = stepper.acceleration(rows)
+        values["torque"][:], values["command"][:], values["load"][:] = rows[0], stepper.command, stepper.load
+        values["position"][:, :2] = points(self.limb, list(stepper.angle))
         self.pattern.publish(self.tick)
+        shown["position"][:], shown["velocity"][:] = stepper.angle, stepper.velocity
+        np.add(rows[0], stepper.command, out=shown["effort"])
+        self.joint_states.publish(self.tick)
 
     @property
     def done(self) -> int:
@@ -214,6 +279,8 @@ class LimbPart(Part):
         """The torque of this tick, or the recorder."""
         if self.finished:
             return ""
+        if self.pending and self.uncommanded:
+            return f"joint_command of tick {self.tick} from a controller"
         if self.pending:
             return f"the recording of tick {self.recorded + 1} from recorder"
         if not self.begun:

@@ -1,4 +1,4 @@
-"""The part of muscle_stack: it answers joint_states k with joint_torque k once it holds the activations k and k + 1."""
+"""The part of muscle_stack: it answers limb_state k with joint_torque k once it holds the activations k and k + 1."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ Input = tuple[FloatArray, FloatArray]
 
 
 class MusclePart(Part):
-    """From activations and joint states to joint torques and the states of muscles.
+    """From activations and the limb's states to joint torques and the states of muscles.
 
-    tick: the newest that is answered. states: topics of states that are sent, every `state_every` ticks. waiting: joint
-    states that are not answered yet; a node that is started anew gets many before the first activation. tell_ranges:
-    called when a length of a muscle leaves its range for the first time, and before the last answer.
+    tick: the newest that is answered. states: topics of states that are sent, every `state_every` ticks. waiting:
+    states of the limb that are not answered yet; a node that is started anew gets many before the first activation.
+    tell_ranges: called when a length of a muscle leaves its range for the first time, and before the last answer.
     """
 
     def __init__(self, *given: Any, states: tuple[str, ...] = STATES, state_every: int = 1, **options: Any) -> None:
@@ -46,7 +46,7 @@ class MusclePart(Part):
         self.torque, self.checkpoint = self.sends("joint_torque"), self.sends("muscle_checkpoint")
         self.states = [self.copied(topic) for topic in states]
         self.takes("activation", self.on_activation, gaps=self.realtime)
-        self.takes("joint_states", self.on_joint_states, gaps=self.realtime)
+        self.takes("limb_state", self.on_limb_state, gaps=self.realtime)
 
     def copied(self, topic: str) -> tuple[Outgoing, list[tuple[FloatArray, FloatArray]]]:
         """The messages of a topic of states, and pairs of target and source to copy into them."""
@@ -71,16 +71,16 @@ class MusclePart(Part):
         self.excitation = values
         self.inputs[tick] = values, self.stepper.drive(values)
 
-    def joint_state(self, data: bytes) -> tuple[FloatArray, FloatArray]:
-        """Angles and velocities of a message."""
-        angle, velocity = (self.values("joint_states", data, name) for name in ("position", "velocity"))
+    def limb_state(self, topic: str, data: bytes) -> tuple[FloatArray, FloatArray]:
+        """Angles and velocities of a message of a topic."""
+        angle, velocity = (self.values(topic, data, name) for name in ("angle", "velocity"))
         return angle.astype(np.float64), velocity.astype(np.float64)
 
-    def on_joint_states(self, tick: int, data: bytes) -> None:
-        """Keep the joint states; in real time the ones before are answered first, with what is there."""
+    def on_limb_state(self, tick: int, data: bytes) -> None:
+        """Keep a state of the limb; in real time the ones before are answered first, with what is there."""
         if self.waiting and self.realtime:
             self.send(None)
-        self.waiting.append((tick, *self.joint_state(data)))
+        self.waiting.append((tick, *self.limb_state("limb_state", data)))
         self.answer()
 
     def answer(self) -> None:
@@ -152,7 +152,7 @@ class MusclePart(Part):
         for tick in range(self.tick + 1, past.tick + 1):
             for known in {tick, tick + 1} & activations.keys():
                 self.keep_activation(known, activations[known])
-            self.waiting.append((tick, *self.joint_state(past.messages["joint_states"][tick])))
+            self.waiting.append((tick, *self.limb_state("movement_pattern", past.messages["movement_pattern"][tick])))
             self.send(self.inputs.get(tick + 1))
 
     @property
@@ -165,6 +165,6 @@ class MusclePart(Part):
         if self.finished:
             return ""
         if not self.waiting:
-            return f"joint_states of tick {self.tick + 1} from limb_dynamics"
+            return f"limb_state of tick {self.tick + 1} from limb_dynamics"
         tick = self.waiting[0][0]
         return f"activation of tick {tick + (tick in self.inputs)} from activation_input"

@@ -8,7 +8,6 @@ from collections.abc import Callable
 import numpy as np
 
 from limb_nodes.exchange.forms import Form
-from limb_nodes.exchange.identity import FRAME
 from limb_nodes.exchange.ticks import SECOND
 
 STAMP, STAMP_AT = struct.Struct("<iI"), 4
@@ -43,9 +42,9 @@ class Outgoing:
         }
         self._tick = self.values.get("tick")
 
-    def identify(self, frame: bytes) -> None:
-        """Let the messages carry the identity of a run; frame: as `frame_of` gives it."""
-        self._data[FRAME] = frame
+    def identify(self, identity: bytes) -> None:
+        """Let the messages carry the identity of a run, as `bytes_of` gives it."""
+        self._data[self.form.run] = identity
 
     def publish(self, tick: int) -> None:
         """Send the numbers as those of a tick."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from limb_nodes.errors import UserError
 from limb_nodes.exchange.forms import Form, forms_of
-from limb_nodes.exchange.identity import FRAME, frame_of, identity_of
+from limb_nodes.exchange.identity import bytes_of, identity_of
 from limb_nodes.exchange.outgoing import Outgoing, ignore
 from limb_nodes.exchange.past import Past
 from limb_nodes.exchange.stream import Conflict, Stream
@@ -29,7 +30,7 @@ class Part:
     def __init__(self, limb: Limb, ticks: Ticks, identity: str = "", realtime: bool = False) -> None:
         self.limb, self.ticks, self.realtime = limb, ticks, realtime
         self.forms: dict[str, Form] = forms_of(limb)
-        self.identity, self._frame = "", b""
+        self.identity, self._own = "", b""
         self.outgoing: dict[str, Outgoing] = {}
         self.streams: dict[str, Stream] = {}
         self._handlers: dict[str, Callable[[int, bytes], None]] = {}
@@ -41,15 +42,15 @@ class Part:
 
     def join(self, identity: str) -> None:
         """Belong to a run from now on."""
-        self.identity, self._frame = identity, frame_of(identity)
+        self.identity, self._own = identity, bytes_of(identity)
         for messages in self.outgoing.values():
-            messages.identify(self._frame)
+            messages.identify(self._own)
 
     def sends(self, topic: str) -> Outgoing:
         """The messages that the part sends on a topic."""
         messages = self.outgoing[topic] = Outgoing(self.forms[topic], self.ticks.nanoseconds)
         if self.identity:
-            messages.identify(self._frame)
+            messages.identify(self._own)
         return messages
 
     def takes(self, topic: str, handler: Callable[[int, bytes], None], gaps: bool) -> None:
@@ -72,17 +73,17 @@ class Part:
 
     def owns(self, topic: str, data: bytes) -> bool:
         """Whether a serialised message belongs to the run; one without a run joins that of the first message."""
-        frame = data[FRAME]
-        if frame == self._frame:
+        given = data[self.forms[topic].run]
+        if given == self._own:
             return True
-        identity = identity_of(frame)
+        identity = identity_of(given)
         if identity and not self.identity:
             self.join(identity)
             return True
         self.foreign += 1
         if not identity:
             # Of another run it is enough to know how many: that run is told to give way.
-            self.complain(f"{topic}: a message has no identity of a run in header.frame_id")
+            self.complain(f"{topic}: a message has no identity of a run in its field run")
         return False
 
     def refuse(self, what: str) -> None:
@@ -91,7 +92,20 @@ class Part:
         self.complain(what)
 
     def take_up(self, past: Past) -> None:
-        """Go on behind the last tick of what has been recorded; before the part receives anything."""
+        """Go on behind the last tick of what has been recorded; before the part receives anything.
+
+        Raises UserError if what is recorded is of another form.
+        """
+        kept = {topic: next(iter(messages.values()), None) for topic, messages in past.messages.items()}
+        checkpoints = {"muscle_checkpoint": past.muscles, "limb_checkpoint": past.limb}
+        kept |= {topic: checkpoint and checkpoint[1] for topic, checkpoint in checkpoints.items()}
+        for topic, data in kept.items():
+            try:
+                self.forms[topic].check(data or self.forms[topic].data)
+            except ValueError as problem:
+                raise UserError(
+                    f"the recorded {topic} {problem}; a bag that was recorded by this version is needed"
+                ) from None
         for stream in self.streams.values():
             stream.go_on_after(past.tick)
         # What is done again has been sent.

@@ -8,12 +8,12 @@ from typing import Any
 
 from limb_nodes.exchange.outgoing import stamp_of
 from limb_nodes.exchange.stream import CHECKPOINT
-from limb_nodes.foundation.topics import SENDERS, STATES
+from limb_nodes.foundation.topics import RECORDED, STATES
 
 # Nobody waits for them: a lost message of a topic that is rarely sent is missed, and sent again, only after seconds.
 CHECKPOINTS = ("muscle_checkpoint", "limb_checkpoint")
 # What the ticks behind a checkpoint are made from.
-NEEDED = ("activation", "joint_states", "joint_torque")
+NEEDED = ("activation", "joint_torque", "movement_pattern")
 
 
 @dataclass
@@ -38,7 +38,7 @@ def expected_topics(parameters: Mapping[str, Any]) -> dict[str, int]:
     """Topic of a run -> every how many ticks it has a message; parameters: of muscle_stack."""
     every = parameters.get("state_every", 1)
     states = {topic: every for topic in STATES if parameters.get(f"publish_{topic}", True)}
-    ticked = {topic: 1 for topic in SENDERS if topic not in STATES}
+    ticked = {topic: 1 for topic in RECORDED if topic not in STATES}
     return {**ticked, **states, **dict.fromkeys(CHECKPOINTS, CHECKPOINT)}
 
 

@@ -64,7 +64,7 @@ class RecordedRun:
 
     def up_to(self, tick: float) -> Iterator[Stored]:
         """What is recorded up to a tick, each tick once, but for what a recorder says itself."""
-        nanoseconds, every = self.info["period_ns"], self.every
+        nanoseconds, every = self.info["period_ns"], self.every | {"joint_states": 1}
         counts = dict.fromkeys(every, 0)
         for message in self.messages():
             at = message.time // nanoseconds

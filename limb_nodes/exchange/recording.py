@@ -6,9 +6,11 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any
 
+from limb_nodes.exchange.forms import joint_states_form
+from limb_nodes.exchange.outgoing import Outgoing
 from limb_nodes.exchange.part import Part
 from limb_nodes.exchange.past import CHECKPOINTS, Past, expected_topics
-from limb_nodes.foundation.topics import SENDERS, STATES
+from limb_nodes.foundation.topics import RECORDED, SENDERS, STATES
 
 
 class RecordingPart(Part):
@@ -21,11 +23,12 @@ class RecordingPart(Part):
     def __init__(self, *given: Any, **options: Any) -> None:
         super().__init__(*given, **options)
         self.expected = {topic: every for topic, every in expected_topics({}).items() if topic not in STATES}
-        self.counts = dict.fromkeys(SENDERS, 0)
+        self.counts = dict.fromkeys(RECORDED, 0)
         self.last_tick = -1
         self.ready = False
-        self._new: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in SENDERS}
-        for topic in SENDERS:
+        self._new: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in RECORDED}
+        self._joint_states = Outgoing(joint_states_form(self.limb), self.ticks.nanoseconds)
+        for topic in RECORDED:
             self.takes(topic, partial(self.on_message, topic), gaps=True)
             self.streams[topic].every = self.expected.get(topic, 1)
 
@@ -57,6 +60,25 @@ class RecordingPart(Part):
         self.counts[topic] += len(new)
         return new
 
+    def joint_states(self, patterns: Iterable[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
+        """Stamps (ns) and messages of joint_states, made of those of movement_pattern."""
+        made: list[bytes] = []
+        messages, given = self._joint_states, partial(self.values, "movement_pattern")
+        messages.send = made.append
+        stamps = []
+        for stamp, data in patterns:
+            values = messages.values
+            values["position"][:], values["velocity"][:] = given(data, "angle"), given(data, "velocity")
+            values["effort"][:] = given(data, "torque") + given(data, "command")
+            messages.publish(stamp // self.ticks.nanoseconds)
+            stamps.append(stamp)
+        return list(zip(stamps, made, strict=True))
+
+    @property
+    def ticks_taken(self) -> int:
+        """How many ticks the run has made, as far as they are known."""
+        return self.newest("movement_pattern") + 1
+
     def newest(self, topic: str) -> int:
         """The newest tick that is taken of a topic, -1 before the first."""
         stream = self.streams[topic]
@@ -76,7 +98,7 @@ class RecordingPart(Part):
 
     def missing(self) -> int:
         """Ticks that are not there on a topic that should have them."""
-        ticks = self.newest("joint_states") + 1
+        ticks = self.ticks_taken
         return sum(max(0, -(-ticks // every) - self.counts[topic]) for topic, every in self.awaited_topics if ticks)
 
     @property

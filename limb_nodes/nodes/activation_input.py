@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from functools import partial
 from typing import Any
 
@@ -11,18 +13,21 @@ from limb_nodes.errors import FieldError, UserError, clean
 from limb_nodes.exchange.activations import ActivationPart
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.nodes.base import LimbNode
+from limb_nodes.nodes.health import Steps
 from limb_nodes.nodes.live_readers import reader
 from limb_nodes.nodes.live_settings import EMG_RATE, ON_SILENCE, SILENCE, LiveSettings
 from limb_nodes.nodes.live_source import LiveSource
 from limb_nodes.nodes.running import main_of
 from limb_nodes.signals.activation import Activation, load_activation
 
+MOST_ON_THE_WAY = 1000
+
 
 class ActivationInput(LimbNode):
-    """On joint_states k sends activation k + 1, and activation 0 before it.
+    """On the limb's state at tick k sends activation k + 1, and activation 0 before it.
 
-    Subscribes `joint_states` and, without a source, `emg_envelope` or `emg`; publishes `activation`, and how the live
-    source does on `/diagnostics`.
+    Subscribes, without a source, `emg_envelope` or `emg`; publishes `activation`, and how the live source does on
+    `/diagnostics`.
     """
 
     part: ActivationPart
@@ -39,6 +44,9 @@ class ActivationInput(LimbNode):
         self.on_silence = settings.on_silence
         self.source: Activation | None = None
         self.live: LiveSource | None = None
+        # Of envelopes that have come: at which tick they reach the limb, and when they came.
+        self.on_the_way: deque[tuple[int, float]] = deque(maxlen=MOST_ON_THE_WAY)
+        self.latency = Steps()
         final: int | None = None
         self.muscles = self.limb.muscle_names
         if source:
@@ -112,6 +120,10 @@ class ActivationInput(LimbNode):
         if tick == self.part.final:
             # Before the message with which the recording ends.
             self.tell_of_source(self.live)
+        if self.live.arrived:
+            # The limb's state one tick later is the first that this message moves.
+            self.on_the_way.append((tick + 1, self.live.arrived))
+            self.live.arrived = 0.0
         return self.newest
 
     @property
@@ -124,12 +136,21 @@ class ActivationInput(LimbNode):
 
     def look_at_source(self, live: LiveSource, tick: int) -> None:
         """Open a live source once the limb moves, and end the run with it if it is to be."""
+        while self.on_the_way and self.on_the_way[0][0] <= tick:
+            self.latency.add(time.monotonic() - self.on_the_way.popleft()[1])
         if live.subscription is None and tick > 0:
             # Not before, so that who waits for a listener starts together with the limb.
             live.open()
         if live.gone and self.on_silence == "stop" and not live.closed:
             live.closed = True
             self.part.end_soon()
+
+    def report(self) -> None:
+        """Publish how the node does: with a live source, how that one does."""
+        if self.live is None or self.live.subscription is None:
+            super().report()
+        else:
+            self.live.report()
 
     def tell_of_source(self, live: LiveSource) -> None:
         """Tell how the live source did until now."""

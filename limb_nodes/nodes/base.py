@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from limb_msgs.msg import Claim
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -23,18 +24,26 @@ from limb_nodes.exchange.part import Part
 from limb_nodes.exchange.recorded import RecordedRun
 from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.exchange.watch import LOOK_PERIOD, STALL, STALL_LIMIT, Watch
+from limb_nodes.foundation.topics import PUBLIC, exchanged
 from limb_nodes.model import Limb, load_limb
+from limb_nodes.nodes.claims import check_claim
 from limb_nodes.nodes.distribution import given_parameters, parameter_values
+from limb_nodes.nodes.health import WINDOW, Counts, Steps
 from limb_nodes.nodes.messages import class_of
+from limb_nodes.nodes.onlookers import Onlookers
 from limb_nodes.nodes.qos import LIVE, STREAM, stream_of
 
 MODES = ("lockstep", "realtime")
+OK, WARN, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.STALE
+# How often a node tells how it does (s).
+REPORT_PERIOD = 1.0
 # What the nodes of a limb declare, all together: a file of parameters may be for all of them.
 PARAMETERS = {
-    "allow_laws", "await_recorder", "band", "band_order", "channels", "command", "copies", "duration", "emg_rate",
-    "identity", "limb", "low_pass", "low_pass_order", "mains", "maximum", "mode", "on_silence", "out",
-    "publish_motor_unit_state", "publish_muscle_state", "publish_sarcomere_state", "rate", "resume", "silence",
-    "source", "stall_limit", "state_every",
+    "allow_laws", "await_recorder", "band", "band_order", "channels", "command", "command_every", "command_timeout",
+    "copies", "duration", "emg_rate", "frame_prefix", "identity", "limb", "load_timeout", "low_pass",
+    "low_pass_order", "mains", "maximum", "mode", "on_silence", "out", "publish_clock", "publish_motor_unit_state",
+    "publish_muscle_state", "publish_sarcomere_state", "rate", "resume", "silence", "source", "stall_limit",
+    "state_every",
 }  # fmt: skip
 # How the names of parameters begin that any node of ROS takes.
 ROS_PARAMETERS = ("use_sim_time", "qos_overrides.", "start_type_description_service")
@@ -60,6 +69,7 @@ class LimbNode(Node):
         self.failure: tuple[str, type[UserError]] | None = None
         self._last_complaint = -math.inf
         self._told = 0
+        self.steps, self._counts = Steps(), Counts()
         self.diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", LIVE)
         path = self.text("limb", "", "the limb's YAML file")
         if not path:
@@ -100,14 +110,31 @@ class LimbNode(Node):
         if self.resume:
             part.take_up(self.recorded_run().past())
         for topic, messages in part.outgoing.items():
-            messages.send = self.create_publisher(class_of(topic), topic, stream_of(topic)).publish
+            own = self.create_publisher(class_of(topic), exchanged(topic), stream_of(topic))
+            messages.send = own.publish
+            if topic in PUBLIC:
+                messages.send = both(own.publish, Onlookers(self.create_publisher(class_of(topic), topic, LIVE)).send)
         for topic in part.streams if listen else ():
 
             def receive(data: bytes, topic: str = topic) -> None:
-                part.receive(topic, data)
+                self.timed(lambda: part.receive(topic, data))
 
-            self.listen(class_of(topic), topic, receive, STREAM, raw=True)
+            self.listen(class_of(topic), exchanged(topic), receive, STREAM, raw=True)
+        self.listen(Claim, exchanged("claim"), self.on_claim, STREAM)
         self.create_timer(LOOK_PERIOD, self.on_look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(REPORT_PERIOD, self.report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def timed(self, work: Callable[[], None]) -> None:
+        """Do some work, and know how long it took if it has led to another tick."""
+        begun, done = time.perf_counter(), self.part.done
+        work()
+        if self.part.done != done:
+            self.steps.add(time.perf_counter() - begun)
+
+    def on_claim(self, claim: Claim) -> None:
+        """Raise UserError if the node cannot be one of a run that has claimed the namespace."""
+        if self.part.identity in ("", claim.run):
+            check_claim(claim, self.get_name(), self.limb, self.ticks, self.mode)
 
     def refuse_unknown(self) -> None:
         """Raise UserError for a parameter that no node of a limb has."""
@@ -133,7 +160,7 @@ class LimbNode(Node):
         part, watch = self.part, self.watch
         if said := watch.look(time.monotonic(), part.done, part.awaited()):
             self.get_logger().warning(said)
-            self.diagnose(said, bad=True, waited=f"{watch.waited:.1f}")
+            self.diagnose(said, WARN, waited=f"{watch.waited:.1f}")
         if watch.given_up:
             self.fail(RunError(f"{self.get_name()} has waited {watch.waited:.0f} s for {part.awaited()}"))
 
@@ -172,7 +199,7 @@ class LimbNode(Node):
         allowed = f"a number from {lowest:g} to {highest:g}"
         value = float(self._declare(name, default, descriptor, allowed))
         if not lowest <= value <= highest:
-            raise UserError(f"{self.get_name()}: the parameter {name} is {value:g}; {allowed} is needed")
+            raise UserError(f"{self.get_name()}: the parameter {name} is {value:.12g}; {allowed} is needed")
         return value
 
     def whole(self, name: str, default: int, meaning: str, lowest: int, highest: int) -> int:
@@ -200,23 +227,40 @@ class LimbNode(Node):
         if now - self._last_complaint >= 1.0:
             self._last_complaint = now
             self.get_logger().warning(f"{clean(what)}; it is not taken ({self.refused} so far)")
-            self.diagnose(what, bad=True)
+            self.diagnose(what, WARN)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """What has gone wrong so far, by what it is."""
+        return {name: getattr(self.part, name) for name in ("bad_input", "foreign", "conflicts")}
+
+    def report(self) -> None:
+        """Publish once a second how the node does: a warning if something has gone wrong lately."""
+        wrong = ", ".join(f"{count} {name}" for name, count in self._counts.lately(self.counts).items() if count)
+        lately = f"{wrong} in the last {WINDOW:g} s" if wrong else ""
+        self.diagnose("; ".join(filter(None, (self.state(), lately))), WARN if wrong else OK, **self.steps.told("step"))
+
+    def state(self) -> str:
+        """In words, what the node is at."""
+        return f"at tick {self.part.done}"
 
     @property
     def refused(self) -> int:
         """How many messages have not been taken."""
         return self.part.bad_input + self.part.foreign
 
-    def diagnose(self, message: str, bad: bool, **values: object) -> None:
-        """Publish on `/diagnostics` how the node does."""
-        self._told = self.refused
-        counts = {name: getattr(self.part, name) for name in ("bad_input", "foreign", "conflicts")}
+    def diagnose(self, message: str, level: bytes, part: str = "", **values: object) -> None:
+        """Publish on `/diagnostics` how the node does, or a part of it."""
+        if not part:
+            self._told = self.refused
+            values |= self.counts
+        values["run"] = self.part.identity
         status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if bad else DiagnosticStatus.OK,
-            name=self.get_fully_qualified_name(),
+            level=level,
+            name=f"{self.get_fully_qualified_name()}{part and ': '}{part}",
             message=message,
-            hardware_id=self.given_identity,
-            values=[KeyValue(key=key, value=str(value)) for key, value in {**values, **counts}.items()],
+            hardware_id=self.limb.name,
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
         stamp = self.get_clock().now().to_msg()
         self.diagnostics.publish(DiagnosticArray(header=Header(stamp=stamp), status=[status]))
@@ -235,5 +279,15 @@ class LimbNode(Node):
     def destroy_node(self) -> None:
         """Tell the last count of messages that were not taken."""
         if hasattr(self, "part") and self.refused > self._told:
-            self.diagnose(f"{self.refused} messages could not be used", bad=True)
+            self.diagnose(f"{self.refused} messages could not be used", WARN)
         super().destroy_node()
+
+
+def both(first: Callable[[bytes], object], second: Callable[[bytes], object]) -> Callable[[bytes], None]:
+    """A way for messages that is two."""
+
+    def send(data: bytes) -> None:
+        first(data)
+        second(data)
+
+    return send

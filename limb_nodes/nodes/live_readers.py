@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from limb_msgs.msg import MuscleActivation
+from limb_msgs.msg import EmgEnvelope
 from std_msgs.msg import Float64MultiArray
 
 from limb_nodes.errors import FieldError
@@ -23,16 +23,16 @@ class EnvelopeReader:
     """Takes envelopes: the muscles' values by name, in any order."""
 
     topic = "emg_envelope"
-    kind: type = MuscleActivation
+    kind: type = EmgEnvelope
 
     def __init__(self, muscles: Sequence[str], settings: LiveSettings) -> None:
         """Raises FieldError if the settings rename to no muscle."""
         self._muscles = muscles
         self._channels = renamed(muscles, settings)
 
-    def read(self, message: MuscleActivation) -> FloatArray:
+    def read(self, message: EmgEnvelope) -> FloatArray:
         """The activations [muscles]. Raises ValueError that says what is wrong."""
-        names, values = message.name, message.activation
+        names, values = message.name, message.envelope
         if len(names) != len(values):
             raise ValueError(f"has {len(names)} names and {len(values)} values; as many are needed")
         given = dict(zip(names, values, strict=True))
@@ -48,7 +48,7 @@ class EnvelopeReader:
             raise ValueError(f"{self._muscles[wrong[0]]} is {activations[wrong[0]]:g}; a number from 0 to 1 is needed")
         return activations
 
-    def stamp(self, message: MuscleActivation) -> tuple[int, int]:
+    def stamp(self, message: EmgEnvelope) -> tuple[int, int]:
         """The time that the source gave the message."""
         return message.header.stamp.sec, message.header.stamp.nanosec
 

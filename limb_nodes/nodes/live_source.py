@@ -6,6 +6,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -18,14 +19,13 @@ from limb_nodes.nodes.messages import type_name
 from limb_nodes.nodes.qos import BEST_EFFORT, EVERY
 
 if TYPE_CHECKING:
-    from limb_nodes.nodes.base import LimbNode
+    from limb_nodes.nodes.activation_input import ActivationInput
 
 # How often a source is looked at (s).
 LOOK_PERIOD = 0.05
 # The longest time between two looks that counts as silence (s): what comes while the node itself stands still waits.
 LONGEST_LOOK = 2 * LOOK_PERIOD
-# How often the state of a source is told (s).
-REPORT_PERIOD = 1.0
+OK, WARN, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.STALE
 # How long a source may take to come (s): nodes may take seconds to find each other.
 PATIENCE = 10.0
 # Without rclpy's warning that a quality of service does not fit: another is taken then.
@@ -51,21 +51,23 @@ class LiveSource:
     not taken any more.
     """
 
-    def __init__(self, node: LimbNode, reader: EnvelopeReader | RawReader, silence: float, muscles: int) -> None:
+    def __init__(self, node: ActivationInput, reader: EnvelopeReader | RawReader, silence: float, muscles: int) -> None:
         self.values = np.zeros(muscles)
         self.messages = self.used = self.unstamped = 0
         self.age, self.silent = 0.0, False
         self.closed = False
+        # When the newest message came that no activation was sent of; 0 if there is none (s of the monotonic clock).
+        self.arrived = 0.0
         self.subscription: Any = None
         self._node, self._reader, self._silence = node, reader, silence
         self._topic = reader.topic
         self._problem = ""
         self._zero_before = False
-        self._looked = self._reported = 0.0
+        self._looked = 0.0
 
     def open(self) -> None:
         """Begin to listen."""
-        self._looked = self._reported = time.monotonic()
+        self._looked = time.monotonic()
         self._subscribe(quality_for(self._node, self._topic))
         self._node.create_timer(LOOK_PERIOD, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -91,11 +93,12 @@ class LiveSource:
 
     def report(self) -> None:
         """Publish the state on `/diagnostics`."""
-        self._reported = time.monotonic()
         state = (SILENT if self.used else NEVER_CAME) if self.lost else HEARD
+        bad = state == NEVER_CAME or self.unstamped or self._problem
         self._node.diagnose(
-            self.told(), bad=self.lost or bool(self.unstamped or self._problem), input=state, messages=self.messages,
-            used=self.used, unstamped=self.unstamped, age=f"{self.age:.3f}",
+            self.told(), STALE if state == SILENT else WARN if bad else OK, input=state, messages=self.messages,
+            used=self.used, unstamped=self.unstamped, age=f"{self.age:.3f}", **self._node.steps.told("step"),
+            **self._node.latency.told("latency"),
         )  # fmt: skip
 
     def told(self) -> str:
@@ -127,8 +130,6 @@ class LiveSource:
 
     def _on_timer(self) -> None:
         self.look()
-        if time.monotonic() - self._reported >= REPORT_PERIOD:
-            self.report()
         if self.subscription.qos_profile.reliability != ReliabilityPolicy.BEST_EFFORT:
             quality = quality_for(self._node, self._topic)
             if quality is BEST_EFFORT:
@@ -149,6 +150,7 @@ class LiveSource:
         self.used += 1
         self._problem = ""
         silence, self.age, self._looked = self.age, 0.0, time.monotonic()
+        self.arrived = self._looked
         if self.silent:
             self.silent = False
             self._node.get_logger().info(f"{self._topic}: heard after {silence:.2f} s")

@@ -6,16 +6,16 @@ from typing import Any
 
 from limb_nodes.exchange.muscles import MusclePart
 from limb_nodes.foundation.topics import STATES
-from limb_nodes.nodes.base import LimbNode
+from limb_nodes.nodes.base import WARN, LimbNode
 from limb_nodes.nodes.running import main_of
 from limb_nodes.solve.ranges import LEFT, OUT_OF_RANGE
 
 
 class MuscleStack(LimbNode):
-    """Answers joint_states k with joint_torque k once it holds the activations k and k + 1.
+    """Answers the limb's state at tick k with joint_torque k once it holds the activations k and k + 1.
 
-    Subscribes `activation` and `joint_states`; publishes `joint_torque`, and on request every
-    `state_every` ticks `muscle_state`, `motor_unit_state` and `sarcomere_state`.
+    Publishes `joint_torque`, and on request every `state_every` ticks `muscle_state`, `motor_unit_state` and
+    `sarcomere_state`.
     """
 
     part: MusclePart
@@ -37,7 +37,7 @@ class MuscleStack(LimbNode):
             self.get_logger().warning("; ".join(f"{length} {words}" for length, words in told.items()))
         self.told = part.tick
         values = {OUT_OF_RANGE + length: words for length, words in told.items()}
-        self.diagnose(LEFT, bad=True, **values)
+        self.diagnose(LEFT, WARN, **values)
 
     def destroy_node(self) -> None:
         """Tell it at last, if the run ends before its last tick."""

@@ -7,12 +7,16 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
+from typing import Any
 
 import rclpy
-from limb_msgs.msg import MuscleActivation
+from builtin_interfaces.msg import Time
+from limb_msgs.msg import EmgEnvelope
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.serialization import serialize_message
+from std_msgs.msg import Header
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.errors import FieldError, UserError
@@ -21,7 +25,9 @@ from limb_nodes.nodes.qos import EVERY
 from limb_nodes.nodes.running import Interrupt, acknowledged, check_namespace, init_ros
 
 TOPIC = "emg_envelope"
-TYPE = "limb_msgs/msg/MuscleActivation"
+TYPE = "limb_msgs/msg/EmgEnvelope"
+# What bags of former versions have in its place.
+FORMER = "limb_msgs/msg/MuscleActivation"
 PACE = Parameter("pace", "1", "recorded seconds per second", above=0.0)
 WAIT = Parameter("wait", "s", "how long to wait for a subscriber", minimum=0.0)
 # Longest sleep, so that Ctrl-C is heard soon (s).
@@ -62,12 +68,22 @@ def read_messages(bag: str, topic: str = TOPIC) -> TimedMessages:
         rows = list(reader.read_raw(topic))
         name = next(name for name in reader.topics if name.endswith(f"/{topic.lstrip('/')}"))
         kind = reader.topics[name]
-    if kind != TYPE:
+        former = list(reader.read_topic(topic)) if kind == FORMER else []
+    if kind == FORMER:
+        rows = [(stamp, serialize_message(envelope_of(message))) for stamp, message in former]
+    elif kind != TYPE:
         raise UserError(f"{bag}: topic {name} has type {kind}; {TYPE} is needed")
     if not rows:
         raise UserError(f"{bag}: topic {name} has no message")
     start = rows[0][0]
     return TimedMessages(name, [(stamp - start) * 1e-9 for stamp, _ in rows], [data for _, data in rows])
+
+
+def envelope_of(message: Any) -> EmgEnvelope:
+    """The envelopes of a message of a former version."""
+    stamp = message.header.stamp
+    header = Header(stamp=Time(sec=stamp.sec, nanosec=stamp.nanosec))
+    return EmgEnvelope(header=header, name=list(message.name), envelope=[float(value) for value in message.activation])
 
 
 def play(
@@ -93,7 +109,7 @@ def play(
     node = None
     try:
         node = Node("play", context=context, namespace=namespace or None, start_parameter_services=False)
-        publisher = node.create_publisher(MuscleActivation, TOPIC, EVERY)
+        publisher = node.create_publisher(EmgEnvelope, TOPIC, EVERY)
         if wait:
             await_listener(node, publisher, wait, interrupt)
         start = time.monotonic()

@@ -12,14 +12,15 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
-from limb_msgs.msg import MuscleActivation
+from limb_msgs.msg import Claim, EmgEnvelope, Recorded
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rclpy.subscription import Subscription
-from std_msgs.msg import Float64MultiArray, Header, String
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, String
 
 from limb_nodes.bags.folder import refuse_existing
 from limb_nodes.bags.versions import versions
@@ -29,17 +30,19 @@ from limb_nodes.exchange.identity import is_identity
 from limb_nodes.exchange.recorded import copy
 from limb_nodes.exchange.recording import RecordingPart
 from limb_nodes.exchange.stream import RECORDER_LAG
-from limb_nodes.foundation.topics import LATCHED_TOPICS, NODES, SENDERS, TOPIC_TYPES
+from limb_nodes.foundation.topics import LATCHED_TOPICS, NODES, RECORDED, TOPIC_TYPES, exchanged
 from limb_nodes.nodes.base import LimbNode
 from limb_nodes.nodes.distribution import parameter_values, taken
 from limb_nodes.nodes.live_source import LOOK_PERIOD, QUIET, quality_for
-from limb_nodes.nodes.messages import class_of, stamp_at
+from limb_nodes.nodes.messages import class_of
 from limb_nodes.nodes.qos import BEST_EFFORT, EVERY, LATCHED, STREAM
 from limb_nodes.nodes.running import main_of
 
 # Of sources, which may offer best effort alone.
-SOURCES = {"emg": Float64MultiArray, "emg_envelope": MuscleActivation}
-OTHERS = {**SOURCES, "external_load": WrenchStamped, "/diagnostics": DiagnosticArray}
+SOURCES = {
+    "emg": Float64MultiArray, "emg_envelope": EmgEnvelope, "external_load": WrenchStamped, "joint_command": JointState
+}  # fmt: skip
+OTHERS = {**SOURCES, "/diagnostics": DiagnosticArray}
 # How often the topics are emptied (s). An executor would take three times as long for each message.
 POLL_PERIOD = 0.005
 # So many ticks at least are brought to the disk at once.
@@ -53,8 +56,8 @@ ASK_AGAIN = 1.0
 class Recorder(LimbNode):
     """Subscribes every topic and writes each tick once.
 
-    Publishes `recorder_progress`, the identity of the run and a time: of tick -1 when it is ready, then of the newest
-    tick that is on the disk on every topic. Finished when the last tick of the run is in the bag on every topic.
+    Tells limb_dynamics when it is ready, and then the newest tick that is on the disk on every topic. Finished when the
+    last tick of the run is in the bag on every topic.
     """
 
     part: RecordingPart
@@ -70,7 +73,7 @@ class Recorder(LimbNode):
         refuse_existing(Path(out))
         self.writer: BagWriter | None = None
         # What has come before the bag is open.
-        self.early: dict[str, list[bytes]] = {topic: [] for topic in (*SENDERS, *OTHERS)}
+        self.early: dict[str, list[bytes]] = {topic: [] for topic in (*RECORDED, *OTHERS)}
         self.announced = -2
         # What is being brought to the disk, and up to which tick.
         self.flushed: tuple[Future[None], int] | None = None
@@ -78,9 +81,10 @@ class Recorder(LimbNode):
         self.askers: dict[str, AsyncParameterClient] = {}
         self.asked: dict[str, float] = {}
         self.first_message: float | None = None
-        self.progress = self.create_publisher(Header, "recorder_progress", LATCHED)
+        self.progress = self.create_publisher(Recorded, exchanged("recorded"), LATCHED)
         self.ticked = {
-            topic: self.create_subscription(class_of(topic), topic, refuse, STREAM, raw=True) for topic in SENDERS
+            topic: self.create_subscription(class_of(topic), exchanged(topic), refuse, STREAM, raw=True)
+            for topic in RECORDED
         }
         self.others = {
             topic: self.create_subscription(
@@ -93,8 +97,6 @@ class Recorder(LimbNode):
         self.description: str | None = None
         self.listen(String, "robot_description", self.on_description, LATCHED)
         self.carry(RecordingPart(**self.common), listen=False)
-        if not self.part.identity:
-            self.listen(Header, "run_identity", self.on_claim, STREAM)
         self.asking = self.create_timer(0.05, self.ask)
 
     def suit_sources(self) -> None:
@@ -108,12 +110,14 @@ class Recorder(LimbNode):
                     kind, topic, refuse, quality, raw=True, event_callbacks=QUIET
                 )
 
-    def on_claim(self, claim: Header) -> None:
+    def on_claim(self, claim: Claim) -> None:
         """Without an identity of its own, record the run that was heard of last, until its first message is there."""
-        if claim.frame_id != self.part.identity and self.first_message is None and is_identity(claim.frame_id):
-            self.part.join(claim.frame_id)
+        new = claim.run != self.part.identity and is_identity(claim.run)
+        if new and not self.given_identity and self.first_message is None:
+            self.part.join(claim.run)
             self.announced = -2
             self.announce()
+        super().on_claim(claim)
 
     def on_description(self, message: String) -> None:
         """Write the robot description, or keep it until the bag is open."""
@@ -162,8 +166,9 @@ class Recorder(LimbNode):
         self.part.expect_states(self.parameters.get("muscle_stack", {}))
         self.part.ready = set(self.parameters) >= set(NODES)
         self.writer = BagWriter(self.path, self.run_info(), namespace=self.get_namespace(), latched=LATCHED_TOPICS)
-        reports = ("/diagnostics",) if self.mode == "realtime" else ()
-        self.writer.expect({topic: TOPIC_TYPES[topic] for topic in (*self.part.expected, *reports)})
+        self.writer.expect(
+            {topic: TOPIC_TYPES[topic] for topic in ("joint_states", "/diagnostics", *self.part.expected)}
+        )
         if self.description is not None:
             self.write("robot_description", 0, String(data=self.description))
         if self.resume and self.copies:
@@ -208,7 +213,7 @@ class Recorder(LimbNode):
         come = {
             topic: list(taken(subscription)) for topic, subscription in (*self.ticked.items(), *self.others.items())
         }
-        if self.first_message is None and any(come[topic] for topic in SENDERS):
+        if self.first_message is None and any(come[topic] for topic in RECORDED):
             self.first_message = time.monotonic()
         if self.writer is None:
             for topic, messages in come.items():
@@ -217,8 +222,11 @@ class Recorder(LimbNode):
         for topic in self.ticked:
             if messages := self.part.drain(topic, [*self.early.pop(topic, ()), *come[topic]]):
                 self.writer.write_many(topic, messages, TOPIC_TYPES[topic])
+                if topic == "movement_pattern":
+                    states = self.part.joint_states(messages)
+                    self.writer.write_many("joint_states", states, TOPIC_TYPES["joint_states"])
         # After the ticks: what a node says before its last one is there when that one is.
-        now = max(0, self.part.newest("joint_states")) * self.ticks.nanoseconds
+        now = max(0, self.part.newest("movement_pattern")) * self.ticks.nanoseconds
         for topic in self.others:
             if others := [(now, data) for data in (*self.early.pop(topic, ()), *come[topic])]:
                 self.writer.write_many(topic, others, TOPIC_TYPES[topic])
@@ -235,13 +243,13 @@ class Recorder(LimbNode):
             self.flushed = self.writer.flush(), complete
         if self.flushed is not None and self.flushed[0].done():
             (_, self.announced), self.flushed = self.flushed, None
-            self.progress.publish(Header(frame_id=part.identity, stamp=stamp_at(self.announced, self.ticks)))
+            self.progress.publish(Recorded(run=part.identity, tick=self.announced))
 
     def destroy_node(self) -> None:
         """Close the bag, so that it is readable however the run ended."""
         try:
             if not self.failure:
-                if self.writer is None and any(self.early[topic] for topic in SENDERS):
+                if self.writer is None and any(self.early[topic] for topic in RECORDED):
                     self.open()
                 self.poll()
         finally:

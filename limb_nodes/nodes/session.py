@@ -11,22 +11,20 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
+from limb_msgs.msg import Recorded
 from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from std_msgs.msg import Header
 
 from limb_nodes.errors import FieldError, RunError, UserError
 from limb_nodes.exchange.recorded import join_parts
-from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.exchange.watch import LOOK_PERIOD, Watch
-from limb_nodes.foundation.topics import NODES
+from limb_nodes.foundation.topics import NODES, exchanged
 from limb_nodes.nodes.activation_input import ActivationInput
 from limb_nodes.nodes.children import Crew
 from limb_nodes.nodes.distribution import make_executor
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
-from limb_nodes.nodes.messages import tick_of
 from limb_nodes.nodes.muscle_stack import MuscleStack
 from limb_nodes.nodes.qos import STREAM
 from limb_nodes.nodes.recorder import Recorder
@@ -66,7 +64,7 @@ def run_in_one_process(settings: RunSettings, progress: Progress) -> Outcome:
         seconds = spin_to_the_end(executor, nodes, interrupt, progress)
         recorder, live = nodes["recorder"], nodes["activation_input"].live
         return Outcome(
-            ticks=recorder.part.counts["joint_states"],
+            ticks=recorder.part.ticks_taken,
             missing=recorder.part.missing(),
             missed=nodes["limb_dynamics"].part.missed,
             bad_input=sum(node.part.bad_input for node in nodes.values()),
@@ -145,12 +143,12 @@ class Observer(Node):
         limit = settings.stall_limit + SLACK
         self._recording, self._stops = Watch(limit, math.inf, SOON), Watch(limit, math.inf, SOON)
         self._next_look = 0.0
-        self._identity, self._ticks = settings.identity, Ticks(settings.rate)
-        self.create_subscription(Header, "recorder_progress", self._on_progress, STREAM)
+        self._identity = settings.identity
+        self.create_subscription(Recorded, exchanged("recorded"), self._on_progress, STREAM)
 
-    def _on_progress(self, message: Header) -> None:
-        if message.frame_id == self._identity:
-            self.recorded = tick_of(message.stamp, self._ticks)
+    def _on_progress(self, message: Recorded) -> None:
+        if message.run == self._identity:
+            self.recorded = message.tick
 
     def look(self, crew: Crew) -> None:
         """Say if nothing is recorded or nodes are stopped; raise RunError if that has lasted too long."""
@@ -208,7 +206,7 @@ def refuse_neighbours(context: Context, namespace: str) -> None:
         while time.monotonic() < end:
             there = [name for name, space in probe.get_node_names_and_namespaces() if name in NODES and space == full]
             # Publishers can be known before the name of their node.
-            if not there and probe.count_publishers("joint_states"):
+            if not there and probe.count_publishers(exchanged("limb_state")):
                 there = ["limb_dynamics"]
             if there:
                 raise FieldError(

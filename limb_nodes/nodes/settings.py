@@ -82,7 +82,7 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run went. ticks: on the topic joint_states; missing: ticks not in the bag, over all topics;
+    """How a run went. ticks: that the limb has made; missing: ticks not in the bag, over all topics;
     missed: deadlines in real time; bad_input: messages that could not be used; foreign: messages of others; conflicts:
     ticks that came twice with different values; seconds: wall time. live: how a live source did, in words, empty
     without one; lost: whether it never came, or was silent at the end. ranges: by length, how far muscles were out
@@ -157,9 +157,9 @@ def reported(bag: BagReader, settings: RunSettings) -> dict[str, Any]:
     names = {f"/{settings.namespace.strip('/')}/{node}".replace("//", "/"): node for node in NODES}
     messages = bag.read_topic("/diagnostics") if bag.has("/diagnostics") else ()
     for status in (status for _, message in messages for status in message.status):
-        if status.name not in names or status.hardware_id != settings.identity:
-            continue  # anybody may write on this topic
         values = {pair.key: pair.value for pair in status.values}
+        if status.name not in names or values.get("run") != settings.identity:
+            continue  # anybody may write on this topic
         node = names[status.name]
         for key, of_node in counts.items():
             told = values.get(key, "0")

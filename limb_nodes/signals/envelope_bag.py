@@ -50,7 +50,6 @@ def write_envelopes(
         "versions": versions(),
     }
     stamps = np.arange(len(result.values), dtype=np.int64) * period
-    ticks = np.arange(len(result.values), dtype=np.uint64)
     with BagWriter(out, run_info) as bag:
         if raw:
             _write_raw(bag, result)
@@ -59,8 +58,8 @@ def write_envelopes(
             ENVELOPE_TOPIC,
             TOPIC_TYPES[ENVELOPE_TOPIC],
             stamps,
-            {"name": result.names, "last_tick": len(result.values) - 1},
-            {"tick": ticks, "activation": result.values},
+            {"name": result.names},
+            {"envelope": result.values},
         )
         if result.angle_channels:
             names = [channel.name for channel in result.angle_channels]

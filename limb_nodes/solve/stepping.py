@@ -202,7 +202,7 @@ class LimbStepper:
     """The chain of segments under torques with slopes.
 
     angle, velocity: of the joints [n] at the current tick. load: tip force x, y (N), tip torque
-    (N m).
+    (N m). command: torque on the joints [n] beside that of the muscles, the same during a tick (N m).
     """
 
     def __init__(self, limb: Limb) -> None:
@@ -212,6 +212,7 @@ class LimbStepper:
         self._state: FloatArray = state.copy()
         self._scale = self.model.state_scale[: 2 * n]
         self._rates = np.empty(2 * n)
+        self.command = np.zeros(n)
         self._control = tick_control()
         # What the last step expects of the next torque; empty if it says nothing.
         self._expected: FloatArray = np.empty(n)
@@ -272,14 +273,15 @@ class LimbStepper:
     def acceleration(self, torque: FloatArray) -> FloatArray:
         """Joint accelerations [n] (rad/s^2) at the current tick under rows of torque [4, n]."""
         data, model = self._data, self.model
-        hold(torque, self._state, NO_TIMES, 1.0, data.held)
+        hold(self._commanded(torque), self._state, NO_TIMES, 1.0, data.held)
         model.program.limb_rates(0.0, self._state, NO_ROWS, model.layout.model.address, data.address, self._rates)
         return self._rates[self.joints :].copy()
 
     def step(self, torque: FloatArray, period: float) -> None:
         """Advance by `period` (s) under torque and slopes [4, n]. Raises SolveError."""
         data = self._data
-        hold(torque, self._state, self._predicted, period, data.held)
+        predicted = self._predicted + self.command if self._predicted.size else self._predicted
+        hold(self._commanded(torque), self._state, predicted, period, data.held)
         before = data.locked.copy()
         how = EXPLICIT.limited if self.model.limited else EXPLICIT.free
         status = solve_tick(how, self._problem, self._control, self._scale, self._state, period)
@@ -288,9 +290,17 @@ class LimbStepper:
         # An impact bends the torque at once, which tells nothing about the tick that follows.
         if same(data.locked, before):
             predict(data.held, self._state, period, self._expected)
+            # What is expected is of the muscles alone: a command may change at any tick.
+            self._expected -= self.command
             self._predicted = self._expected
         else:
             self._predicted = NO_TIMES
+
+    def _commanded(self, torque: FloatArray) -> FloatArray:
+        """Rows of torque [4, n] of muscles and command."""
+        both = torque.copy()
+        both[0] += self.command
+        return both
 
 
 def tick_input(last_drive: FloatArray | None, drive: FloatArray, next_drive: FloatArray) -> FloatArray:

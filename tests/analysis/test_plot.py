@@ -109,7 +109,7 @@ def write_envelopes(path: Path, names: list[str], angles: list[str], ticks: int 
     with BagWriter(path, {"source": "/somewhere/walk.txt", "rate": float(RATE)}) as bag:
         for k in range(ticks):
             stamp = (first + k) * 1_000_000_000 // RATE
-            message = make_message(TOPIC_TYPES["emg_envelope"], stamp, tick=k, name=names, activation=envelopes[k])
+            message = make_message(TOPIC_TYPES["emg_envelope"], stamp, name=names, envelope=envelopes[k])
             bag.write("emg_envelope", stamp, message)
             if angles:
                 message = make_message("sensor_msgs/msg/JointState", stamp, name=angles, position=recorded[k])

@@ -120,7 +120,7 @@ def test_table_agrees_with_the_messages(topic: str, tmp_path: Path) -> None:
                 for part in name.split("."):
                     value = getattr(value, part)
                 if column.dtype.kind == "U":
-                    assert list(column) == list(value)
+                    assert column.tolist() == value
                 elif name != "position" or not msgtype.startswith("limb_msgs/"):
                     np.testing.assert_array_equal(column[k], value)
 

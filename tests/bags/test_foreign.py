@@ -255,6 +255,7 @@ def test_messages_of_the_other_byte_order(tmp_path: Path) -> None:
         assert bag.kinds("emg") == {
             "header.stamp": "time",
             "header.frame_id": "string",
+            "run": "string",
             "tick": "uint64",
             "last_tick": "int64",
             "name": "string[]",

@@ -76,7 +76,7 @@ def envelopes(tmp_path: Path) -> Path:
     """A bag as of `limb emg`: two envelopes and a recorded angle at 100 Hz."""
     stamps, values = np.arange(101) * 10_000_000, np.random.default_rng(3).random((101, 2))
     with BagWriter(tmp_path / "env", {}) as writer:
-        write(writer, "emg_envelope", stamps, {"name": MUSCLES}, {"activation": values})
+        write(writer, "emg_envelope", stamps, {"name": MUSCLES}, {"envelope": values})
         write(writer, "reference_angle", stamps, {"name": ["knee"]}, {"position": values[:, :1] * 2.0})
     return tmp_path / "env"
 
@@ -235,7 +235,7 @@ def test_exported_envelopes_drive_a_limb(envelopes: Path, tmp_path: Path, ending
     assert main(["export", str(envelopes), "-o", str(out), "--topics", "emg_envelope"]) == 0
     muscles = [name if ending == ".csv" else "_".join(name.split()) for name in MUSCLES]
     with BagReader(envelopes) as reader:
-        expected = reader.table("emg_envelope")["activation"]
+        expected = reader.table("emg_envelope")["envelope"]
     np.testing.assert_array_equal(load_activation(str(out), muscles, 100.0, None).values, expected)
 
 
@@ -360,7 +360,7 @@ def test_rows_are_the_times_that_all_topics_have(tmp_path: Path, capsys: pytest.
     with BagWriter(path, {}) as writer:
         write(writer, "activation", np.arange(100) * PERIOD, {"name": ["RF"]}, {"activation": values})
         write(writer, "joint_torque", np.arange(3, 98) * PERIOD, {"joint": ["knee"]}, {"torque": values[3:98]})
-        write(writer, "emg_envelope", np.arange(50) * PERIOD * 2 + 17, {"name": ["RF"]}, {"activation": values[:50]})
+        write(writer, "emg_envelope", np.arange(50) * PERIOD * 2 + 17, {"name": ["RF"]}, {"envelope": values[:50]})
     assert main(["export", str(path), "-o", str(out)]) == 0
     columns = comma_separated(out)
     assert list(columns) == ["time [s]", "RF", "knee_torque [N m]"]
@@ -432,7 +432,7 @@ def test_numbers_that_opensim_does_not_read_are_refused(tmp_path: Path, capsys: 
     path, out = tmp_path / "bag", tmp_path / "a.sto"
     values = np.array([[0.1], [np.nan], [0.2]])
     with BagWriter(path, {}) as writer:
-        write(writer, "emg_envelope", np.arange(3) * PERIOD, {"name": ["RF"]}, {"activation": values})
+        write(writer, "emg_envelope", np.arange(3) * PERIOD, {"name": ["RF"]}, {"envelope": values})
     assert main(["export", str(path), "-o", str(out)]) == 2
     assert capsys.readouterr().err == f"limb: error: {out}: RF is nan at 0.001 s; a finite number is needed in a .sto\n"
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["bag"], "nothing is left half written"
@@ -445,7 +445,7 @@ def test_names_that_change_are_refused(tmp_path: Path, capsys: pytest.CaptureFix
     with BagWriter(path, {}) as writer:
         for part, name in enumerate(["RF", "BF"]):
             stamps = (np.arange(ROWS) + part * ROWS) * PERIOD
-            write(writer, "emg_envelope", stamps, {"name": [name]}, {"activation": np.zeros((ROWS, 1))})
+            write(writer, "emg_envelope", stamps, {"name": [name]}, {"envelope": np.zeros((ROWS, 1))})
     for options in ([], ["--from", "4.096"]):
         assert main(["export", str(path), "-o", str(tmp_path / "a.csv"), *options]) == 2
         line = "topic /emg_envelope has other names at 4.096 s than at its start; the same in every message are needed"

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from limb_nodes.exchange.forms import DOUBLE, Form
-from limb_nodes.exchange.identity import FRAME, frame_of
+from limb_nodes.exchange.identity import bytes_of
 from limb_nodes.exchange.outgoing import STAMP, STAMP_AT, stamp_of
 from limb_nodes.exchange.ticks import SECOND
 
@@ -50,9 +50,9 @@ def valued(form: Form, data: bytes, change: Callable[[np.ndarray], np.ndarray | 
     return bytes(changed)
 
 
-def framed(data: bytes, frame: bytes) -> bytes:
+def of_run(form: Form, data: bytes, run: bytes) -> bytes:
     """A message with other bytes in the place of the identity."""
-    return data[: FRAME.start] + frame + data[FRAME.stop :]
+    return data[: form.run.start] + run + data[form.run.stop :]
 
 
 def moved(values: np.ndarray) -> np.ndarray:
@@ -68,14 +68,14 @@ def future(form: Form, data: bytes, period: int, *steps: int) -> list[bytes]:
 
 def renamed(form: Form, data: bytes, period: int) -> list[bytes]:
     """Another letter in the first name."""
-    place = FRAME.stop + next(k for k, byte in enumerate(data[FRAME.stop :]) if chr(byte).isalpha())
+    place = form.run.stop + next(k for k, byte in enumerate(data[form.run.stop :]) if chr(byte).isalpha())
     return [data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :]]
 
 
 FORGERS: dict[str, Forger] = {
-    "no identity": lambda form, data, period: [framed(data, struct.pack("<I", 33) + b"x" * 32 + b"\0")],
-    "empty frame": lambda form, data, period: [data[: FRAME.start] + struct.pack("<IB", 1, 0) + data[FRAME.stop :]],
-    "another identity": lambda form, data, period: [framed(valued(form, data, moved), frame_of(OTHER))],
+    "no identity": lambda form, data, period: [of_run(form, data, struct.pack("<I", 33) + b"x" * 32 + b"\0")],
+    "empty identity": lambda form, data, period: [of_run(form, data, struct.pack("<IB", 1, 0))],
+    "another identity": lambda form, data, period: [of_run(form, valued(form, data, moved), bytes_of(OTHER))],
     "a copy": lambda form, data, period: [data],
     "other numbers": lambda form, data, period: future(form, data, period, 0),
     "next tick": lambda form, data, period: future(form, data, period, 1),
@@ -98,6 +98,6 @@ FORGERS: dict[str, Forger] = {
     "tick unlike its stamp": lambda form, data, period: [
         numbered(form, future(form, data, period, 1)[0], "tick", stamp_of(data) // period + 3)
     ],
-    "a header alone": lambda form, data, period: [data[: FRAME.stop]],
+    "a header alone": lambda form, data, period: [data[: form.run.stop]],
 }
 """Kind -> the messages of it, made of a form, a real message of the topic and the nanoseconds of a tick."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from limb_nodes.exchange.past import CHECKPOINTS
 from limb_nodes.exchange.stream import RECORDER_LAG
-from limb_nodes.foundation.topics import NODES, SENDERS
+from limb_nodes.foundation.topics import NODES, RECORDED
 from limb_nodes.model import load_limb
 from tests.faults.forged import FORGERS
 from tests.faults.simulated import (
@@ -34,7 +34,7 @@ LIMB = Path(__file__).resolve().parents[2] / "params" / "reference_joint_tendon.
 FINAL = 30
 READERS = {
     "activation": ("muscle_stack", "recorder"),
-    "joint_states": ("activation_input", "muscle_stack", "recorder"),
+    "limb_state": ("activation_input", "muscle_stack"),
     "joint_torque": ("limb_dynamics", "recorder"),
     "movement_pattern": ("recorder",),
     "muscle_state": ("recorder",),
@@ -94,7 +94,7 @@ def drawn_fault(draw: random.Random, kind: str) -> Fault:
 
 def certain(bag: Values) -> int:
     """How many ticks of a record cannot hold what only a stranger has sent: the real ones have come, too."""
-    reached = min(max((tick for at, tick in bag if at == topic), default=-1) for topic in SENDERS)
+    reached = min(max((tick for at, tick in bag if at == topic), default=-1) for topic in RECORDED)
     return reached + (reached == FINAL)
 
 

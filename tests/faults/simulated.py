@@ -28,7 +28,7 @@ from limb_nodes.exchange import part as part_module
 from limb_nodes.exchange import past as past_module
 from limb_nodes.exchange import stream as stream_module
 from limb_nodes.exchange.activations import ActivationPart
-from limb_nodes.exchange.identity import frame_of
+from limb_nodes.exchange.identity import bytes_of
 from limb_nodes.exchange.movement import LimbPart
 from limb_nodes.exchange.muscles import MusclePart
 from limb_nodes.exchange.part import Part
@@ -37,13 +37,13 @@ from limb_nodes.exchange.recording import RecordingPart
 from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.exchange.watch import LOOK_PERIOD, Watch
 from limb_nodes.foundation.arrays import FloatArray
-from limb_nodes.foundation.topics import NODES, SENDERS
+from limb_nodes.foundation.topics import NODES, RECORDED
 from limb_nodes.model import Limb
 from limb_nodes.solve import stepping
-from tests.faults.forged import FORGERS, framed
+from tests.faults.forged import FORGERS, of_run
 
 IDENTITY = "5eed" * 8
-PROGRESS = "recorder_progress"
+PROGRESS = "recorded"
 # As in the nodes (s): how often the recorder empties its topics, how long it may keep from the disk what it wrote,
 # how long that takes at most, how often the parent looks at its children, and how long a node that has finished stays.
 POLL, FLUSH, FLUSHING, TURN, LINGER = 0.005, 0.2, 0.02, 0.05, 5.0
@@ -355,7 +355,7 @@ class RecorderProcess(Process):
         self.resume = ""
         self.lost = 0.0
         self.opened = self._flushing = self._polls = False
-        self._come: dict[str, list[bytes]] = {topic: [] for topic in SENDERS}
+        self._come: dict[str, list[bytes]] = {topic: [] for topic in RECORDED}
 
     def begin(self) -> None:
         super().begin()
@@ -631,7 +631,7 @@ class Run:
         if fault.where == PROGRESS:
             return [(IDENTITY, int(fault.what))]
         form = forms_once(self.setting.limb)[fault.where]
-        data = self.newest.get(fault.where, framed(form.data, frame_of(IDENTITY)))
+        data = self.newest.get(fault.where, of_run(form, form.data, bytes_of(IDENTITY)))
         return FORGERS[fault.what](form, data, self.setting.ticks.nanoseconds)
 
     def say(self, who: str, what: str, still: bool = True) -> None:

@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from limb_nodes.exchange.identity import bytes_of
+from limb_nodes.foundation.topics import exchanged
 from tests.faults.forged import FORGERS
 from tests.faults.trial import Trial
 
 KIND = "messages of strangers, real nodes"
-TOPICS = ("activation", "joint_states", "joint_torque", "movement_pattern")
+TOPICS = ("activation", "limb_state", "joint_torque", "movement_pattern")
 KINDS = [(topic, kind) for kind in FORGERS for topic in TOPICS]
 MODES = ("lockstep", "realtime")
 COUNT = len(KINDS) * len(MODES)
@@ -62,10 +64,10 @@ def run(out: Path, mode: str, stranger: tuple[str, str] | None) -> tuple[dict[st
         if stranger is not None:
             topic, kind = stranger
             part = nodes["limb_dynamics"].part
-            publisher = graph.publisher(class_of(topic), topic, STREAM)
+            publisher = graph.publisher(class_of(topic), exchanged(topic), STREAM)
             form = part.forms[topic]
             newest = bytearray(form.data)
-            newest[12:49] = part._frame
+            newest[form.run] = bytes_of(part.identity)
             newest[4:12] = np.array(divmod(part.tick * part.ticks.nanoseconds, 10**9), dtype="<u4").tobytes()
             if "tick" in form.numbers:
                 start = form.numbers["tick"][0]

@@ -269,7 +269,7 @@ class Bags:
         return [
             f"{topic}.{field}"
             for topic in TICKED
-            for field in {*first[topic], *second[topic]}
+            for field in {*first[topic], *second[topic]} - {"run"}
             if not np.array_equal(first[topic].get(field), second[topic].get(field))  # type: ignore[arg-type]
         ]
 
@@ -298,10 +298,7 @@ class Bags:
         columns = np.stack(list(values.values()), axis=1)
         with BagWriter(path, {"rate": rate}) as bag:
             for k, row in enumerate(columns):
-                message = make_message(
-                    "limb_msgs/msg/MuscleActivation", k * period, tick=k, last_tick=len(columns) - 1,
-                    name=list(values), activation=row,
-                )  # fmt: skip
+                message = make_message("limb_msgs/msg/EmgEnvelope", k * period, name=list(values), envelope=row)
                 bag.write("emg_envelope", k * period, message)
         return str(path)
 

@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from limb_msgs.msg import JointTorque, MuscleActivation
-from sensor_msgs.msg import JointState
+from limb_msgs.msg import Claim, JointTorque, LimbState, MuscleActivation, Recorded
 from std_msgs.msg import Header
 
 from limb_nodes.exchange.identity import new_identity
+from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.foundation.topics import exchanged
+from limb_nodes.model import load_limb
 from limb_nodes.nodes.claims import comes_before, new_claim
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
 from limb_nodes.nodes.muscle_stack import MuscleStack
@@ -104,41 +106,45 @@ def test_of_two_that_start_together_one_goes_on(limb, load, processes, until, tm
         assert (survivor.wait(), survivor.said) == (130, "")
 
 
-def test_the_earlier_claim_comes_before_whoever_compares():
-    first, second = new_claim(new_identity()), new_claim(new_identity())
+def claimed(limb: str, identity: str = "", rate: float = 1000.0, mode: str = "lockstep") -> Claim:
+    return new_claim(identity or new_identity(), load_limb(limb), Ticks(rate), mode)
+
+
+def test_the_earlier_claim_comes_before_whoever_compares(limb):
+    first, second = claimed(limb), claimed(limb)
     assert comes_before(first, second) and not comes_before(second, first)  # noqa: PT018
-    second.stamp = first.stamp
+    second.since = first.since
     assert comes_before(first, second) != comes_before(second, first)
     assert not comes_before(first, first)
 
 
 def test_limb_dynamics_gives_way_to_an_earlier_claim_and_answers_a_later_one(bench, limb):
-    earlier = new_claim(new_identity())
+    earlier = claimed(limb)
     graph = bench()
-    heard = graph.listen(Header, "run_identity", STREAM)
+    heard = graph.listen(Claim, exchanged("claim"), STREAM)
     node = graph.add(LimbDynamics, limb=limb)
     graph.until(lambda: heard, "its claim")
-    assert heard[0].frame_id == node.part.identity
-    claims = graph.publisher(Header, "run_identity", LATCHED, listeners=2)
-    claims.publish(new_claim(new_identity()))
+    assert heard[0].run == node.part.identity
+    claims = graph.publisher(Claim, exchanged("claim"), LATCHED, listeners=2)
+    claims.publish(claimed(limb))
     graph.until(lambda: heard.count(heard[0]) == 2, "its claim, again")
     assert node.failure is None
     claims.publish(earlier)
     graph.until(lambda: node.failure, "it to give way")
-    assert earlier.frame_id in node.failure[0]
+    assert earlier.run in node.failure[0]
     assert "namespace is /, in which" in node.failure[0]
 
 
 def activation(identity: str, tick: int, value: float) -> MuscleActivation:
-    return MuscleActivation(header=header(identity, tick), tick=tick, name=MUSCLES, activation=[value, value])
+    return MuscleActivation(header=header(tick), run=identity, tick=tick, name=MUSCLES, activation=[value, value])
 
 
-def states(identity: str, tick: int) -> JointState:
-    return JointState(header=header(identity, tick), name=JOINTS, position=[0.5], velocity=[0.0])
+def states(identity: str, tick: int) -> LimbState:
+    return LimbState(header=header(tick), run=identity, tick=tick, joint=JOINTS, angle=[0.5], velocity=[0.0])
 
 
-def header(identity: str, tick: int) -> Header:
-    message = Header(frame_id=identity)
+def header(tick: int) -> Header:
+    message = Header()
     message.stamp.nanosec = tick * 1_000_000
     return message
 
@@ -147,27 +153,27 @@ def header(identity: str, tick: int) -> Header:
 def test_a_node_takes_its_run_s_messages_alone(given, bench, limb, capfd):
     own, other = new_identity(), new_identity()
     graph = bench()
-    heard = graph.listen(JointTorque, "joint_torque", STREAM)
+    heard = graph.listen(JointTorque, exchanged("joint_torque"), STREAM)
     node = graph.add(MuscleStack, limb=limb, rate=1000.0, **({"identity": own} if given else {}))
-    activations = graph.publisher(MuscleActivation, "activation", STREAM)
-    joints = graph.publisher(JointState, "joint_states", STREAM)
+    activations = graph.publisher(MuscleActivation, exchanged("activation"), STREAM)
+    joints = graph.publisher(LimbState, exchanged("limb_state"), STREAM)
     activations.publish(activation(own, 0, 0.5))
     graph.until(lambda: 0 in node.part.inputs, "the first activation")
     for identity, value in (other, 0.9), (own, 0.25):
         activations.publish(activation(identity, 1, value))
         joints.publish(states(identity, 0))
     graph.until(lambda: heard, "a torque")
-    assert (node.part.identity, heard[0].header.frame_id, len(heard)) == (own, own, 1)
+    assert (node.part.identity, heard[0].run, len(heard)) == (own, own, 1)
     assert node.part.excitation.tolist() == [0.25, 0.25]
     assert (node.part.bad_input, node.part.foreign) == (0, 2)
     joints.publish(states("", 1))
     graph.until(lambda: node.part.foreign == 3, "the message without an identity to be counted")
-    assert "header.frame_id" in capfd.readouterr().err
+    assert "its field run" in capfd.readouterr().err
 
 
 def test_a_recorder_without_an_identity_records_the_run_that_it_hears_of(bench, limb, tmp_path):
     graph = bench()
-    ready = graph.listen(Header, "recorder_progress", STREAM)
+    ready = graph.listen(Recorded, exchanged("recorded"), STREAM)
     recorder = graph.add(Recorder, limb=limb, rate=1000.0, out=str(tmp_path / "run"))
     gone = graph.add(LimbDynamics, limb=limb, rate=1000.0, await_recorder=True)
     graph.until(lambda: recorder.part.identity == gone.part.identity, "the first run")
@@ -177,6 +183,6 @@ def test_a_recorder_without_an_identity_records_the_run_that_it_hears_of(bench, 
         own = {"source": "flexor=0.9,extensor=0", "duration": 0.01} if name == "activation_input" else {}
         graph.add(CLASSES[name], limb=limb, rate=1000.0, **own)
     graph.until(lambda: recorder.finished, "the end of the second run")
-    assert {message.frame_id for message in ready} <= {gone.part.identity, dynamics.part.identity}
+    assert {message.run for message in ready} <= {gone.part.identity, dynamics.part.identity}
     assert recorder.part.identity == dynamics.part.identity
     assert recorder.part.missing() == 0

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
-from limb_msgs.msg import JointTorque, MuscleActivation
+from limb_msgs.msg import EmgEnvelope, JointTorque, LimbState, MuscleActivation
 from rclpy.duration import Duration
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from limb_nodes.bags.read import BagReader
 from limb_nodes.exchange.identity import new_identity
 from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.foundation.topics import exchanged
 from limb_nodes.nodes.activation_input import ActivationInput
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
 from limb_nodes.nodes.messages import stamp_at
@@ -45,13 +45,13 @@ BAD_ACTIVATIONS = {
     "nothing": {"name": [], "activation": []},
 }
 BAD_STATES = {
-    "NaN angle": {"position": [NAN]},
+    "NaN angle": {"angle": [NAN]},
     "infinite velocity": {"velocity": [INF]},
-    "other joint": {"name": ["knee"]},
+    "other joint": {"joint": ["knee"]},
     "no velocity": {"velocity": []},
-    "no angle": {"position": []},
-    "too many": {"position": [0.1, 0.2]},
-    "nothing": {"name": [], "position": [], "velocity": []},
+    "no angle": {"angle": []},
+    "too many": {"angle": [0.1, 0.2]},
+    "nothing": {"joint": [], "angle": [], "velocity": []},
 }
 BAD_TORQUES = {
     "NaN": {"torque": [NAN]},
@@ -65,22 +65,27 @@ BAD_TORQUES = {
 
 
 def header(tick: int) -> Header:
-    return Header(stamp=stamp_at(tick, TICKS), frame_id=RUN)
+    return Header(stamp=stamp_at(tick, TICKS))
 
 
 def activation(tick: int, **fields: Any) -> MuscleActivation:
     given = {"name": MUSCLES, "activation": [0.5, 0.5], **fields}
-    return MuscleActivation(header=header(tick), tick=tick, **given)
+    return MuscleActivation(header=header(tick), run=RUN, tick=tick, **given)
 
 
-def states(tick: int, **fields: Any) -> JointState:
-    given = {"name": JOINTS, "position": [0.5], "velocity": [0.0], **fields}
-    return JointState(header=header(tick), **given)
+def envelope(tick: int, **fields: Any) -> EmgEnvelope:
+    given = {"name": MUSCLES, "activation": [0.5, 0.5], **fields}
+    return EmgEnvelope(header=header(tick), name=given["name"], envelope=given["activation"])
+
+
+def states(tick: int, **fields: Any) -> LimbState:
+    given = {"joint": JOINTS, "angle": [0.5], "velocity": [0.0], **fields}
+    return LimbState(header=header(tick), run=RUN, tick=tick, **given)
 
 
 def torque(tick: int, **fields: Any) -> JointTorque:
     zeros = {key: [0.0] for key in ("torque", "slope_angle", "slope_velocity", "slope_time")}
-    return JointTorque(header=header(tick), tick=tick, **{"joint": JOINTS, **zeros, **fields})
+    return JointTorque(header=header(tick), run=RUN, tick=tick, **{"joint": JOINTS, **zeros, **fields})
 
 
 def warnings(said: str, node: str) -> list[str]:
@@ -95,18 +100,18 @@ def once_per_second(lines: list[str], begun: float) -> None:
 def test_activation_input_keeps_the_last_good_envelope(bench, limb, capfd):
     graph = bench()
     told = graph.listen(DiagnosticArray, "/diagnostics", LIVE)
-    heard = graph.listen(MuscleActivation, "activation", STREAM)
+    heard = graph.listen(MuscleActivation, exchanged("activation"), STREAM)
     node = graph.add(ActivationInput, limb=limb, mode="realtime", rate=RATE)
-    joints = graph.publisher(JointState, "joint_states", STREAM)
+    joints = graph.publisher(LimbState, exchanged("limb_state"), STREAM)
     graph.until(lambda: node.diagnostics.get_subscription_count(), "who listens to diagnostics")
     for tick in 0, 1:
         joints.publish(states(tick))
-    envelope = graph.publisher(MuscleActivation, "emg_envelope", LIVE)
-    envelope.publish(activation(0, activation=[0.25, 0.75]))
+    envelopes = graph.publisher(EmgEnvelope, "emg_envelope", LIVE)
+    envelopes.publish(envelope(0, activation=[0.25, 0.75]))
     graph.until(lambda: node.newest.tolist() == [0.25, 0.75], "the good envelope")
     begun = time.monotonic()
     for count, fields in enumerate([*BAD_ACTIVATIONS.values()] * 10, 1):
-        envelope.publish(activation(count, **fields))
+        envelopes.publish(envelope(count, **fields))
         graph.until(lambda count=count: node.part.bad_input == count, f"envelope {count} to be counted")
     once_per_second(warnings(capfd.readouterr().err, "activation_input"), begun)
     for tick in 2, 3, 4, 5, 6, 7:
@@ -116,7 +121,7 @@ def test_activation_input_keeps_the_last_good_envelope(bench, limb, capfd):
     graph.until(lambda: told, "a diagnostic")
     assert told[0].status[0].name == "/activation_input"
     # More muscles than needed, in another order, are good.
-    envelope.publish(activation(0, name=["other", "extensor", "flexor"], activation=[NAN, 0.1, 0.2]))
+    envelopes.publish(envelope(0, name=["other", "extensor", "flexor"], activation=[NAN, 0.1, 0.2]))
     graph.until(lambda: node.newest.tolist() == [0.2, 0.1], "the envelope of three muscles")
     assert node.part.bad_input == 90
 
@@ -133,10 +138,10 @@ def test_muscle_stack_waits_for_a_good_activation(fields, bench, limb):
 
 def test_muscle_stack_waits_for_good_joint_states(bench, limb, capfd):
     graph = bench()
-    heard = graph.listen(JointTorque, "joint_torque", STREAM)
+    heard = graph.listen(JointTorque, exchanged("joint_torque"), STREAM)
     node = graph.add(MuscleStack, limb=limb, rate=RATE)
-    activations = graph.publisher(MuscleActivation, "activation", STREAM)
-    joints = graph.publisher(JointState, "joint_states", STREAM)
+    activations = graph.publisher(MuscleActivation, exchanged("activation"), STREAM)
+    joints = graph.publisher(LimbState, exchanged("limb_state"), STREAM)
     for tick in range(3):
         activations.publish(activation(tick))
     joints.publish(states(0))
@@ -155,9 +160,9 @@ def test_muscle_stack_waits_for_good_joint_states(bench, limb, capfd):
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
 def test_limb_dynamics_keeps_bad_torques_out(mode, bench, limb, capfd):
     graph = bench()
-    heard = graph.listen(JointState, "joint_states", STREAM)
+    heard = graph.listen(LimbState, exchanged("limb_state"), STREAM)
     node = graph.add(LimbDynamics, limb=limb, rate=RATE, mode=mode, identity=RUN)
-    torques = graph.publisher(JointTorque, "joint_torque", STREAM)
+    torques = graph.publisher(JointTorque, exchanged("joint_torque"), STREAM)
     graph.until(lambda: heard, "joint states 0")
     begun = time.monotonic()
     for count, fields in enumerate(BAD_TORQUES.values(), 1):
@@ -166,7 +171,7 @@ def test_limb_dynamics_keeps_bad_torques_out(mode, bench, limb, capfd):
     assert node.part.tick == 0
     torques.publish(torque(0))
     graph.until(lambda: node.part.tick >= 1 and len(heard) >= 2, "joint states 1")
-    assert np.isfinite([*heard[1].position, *heard[1].velocity]).all()
+    assert np.isfinite([*heard[1].angle, *heard[1].velocity]).all()
     lines = warnings(capfd.readouterr().err, "limb_dynamics")
     once_per_second([line for line in lines if "it is not taken" in line], begun)
 
@@ -217,10 +222,10 @@ def test_a_load_acts_as_the_limb_s_own_tip_force(bench, limb, waves, bags, tmp_p
 def test_a_load_is_recorded(bench, limb, until, tmp_path):
     graph = bench()
     recorder = graph.add(Recorder, limb=limb, out=str(tmp_path / "run"), rate=RATE)
-    joints = graph.publisher(JointState, "joint_states", STREAM)
+    torques = graph.publisher(JointTorque, exchanged("joint_torque"), STREAM)
     loads = graph.publisher(WrenchStamped, "external_load", LIVE)
-    joints.publish(states(0))
-    graph.until(lambda: recorder.part.counts["joint_states"], "joint states")
+    torques.publish(torque(0))
+    graph.until(lambda: recorder.part.counts["joint_torque"], "a torque")
     loads.publish(load(3.0, -2.0, 0.5))
     until(lambda: loads.wait_for_all_acked(Duration(seconds=1.0)), "the load to arrive")
     graph.finish(recorder)

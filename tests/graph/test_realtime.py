@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from limb_msgs.msg import MuscleActivation
+from limb_msgs.msg import EmgEnvelope, MuscleActivation
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.signals import SignalHandlerOptions
@@ -19,6 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from limb_nodes.bags.read import BagReader
 from limb_nodes.exchange.movement import MOST_AHEAD, TORQUE_FIELDS
 from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.foundation.topics import exchanged
 from limb_nodes.model import load_limb
 from limb_nodes.nodes.activation_input import ActivationInput
 from limb_nodes.nodes.limb_dynamics import LimbDynamics
@@ -136,7 +137,7 @@ def test_a_played_recording_moves_the_limb_as_in_lockstep(limb, lockstep, proces
     }
     recording = np.stack([*envelope.values()], axis=1)
     graph, out = bench(), tmp_path / "run"
-    heard = graph.listen(MuscleActivation, "activation", STREAM)
+    heard = graph.listen(MuscleActivation, exchanged("activation"), STREAM)
     player = processes.limb("play", bags.envelopes(tmp_path / "envelopes", envelope, rate), "--wait", "300")
     live = processes.limb("run", resting, "--mode", "realtime", "--rate", "50", "--out", out, "--state-every", "50")
     assert (player.wait(), player.said) == (0, ""), player.said
@@ -149,7 +150,7 @@ def test_a_played_recording_moves_the_limb_as_in_lockstep(limb, lockstep, proces
     assert live.wait() == 130
     assert "Traceback" not in live.said
     found = bags.decoded(out, (*TOPICS, "emg_envelope"))
-    np.testing.assert_array_equal(found["emg_envelope"]["activation"], recording)
+    np.testing.assert_array_equal(found["emg_envelope"]["envelope"], recording)
     # Of each tick, the newest sample there was; none returns.
     samples = [np.flatnonzero((recording == row).all(axis=1)).item() for row in found["activation"]["activation"]]
     assert samples == sorted(samples)
@@ -237,7 +238,7 @@ def test_play_does_not_take_a_recorder_for_a_listener(processes, bench, until, b
         context = Context()
         rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
         recorder = rclpy.create_node("recorder", context=context, start_parameter_services=False)
-        recorder.create_subscription(MuscleActivation, "emg_envelope", lambda message: None, EVERY)
+        recorder.create_subscription(EmgEnvelope, "emg_envelope", lambda message: None, EVERY)
         until(lambda node=recorder: node.count_publishers("emg_envelope") or not player.running(), "the player")
         close(context, None, [recorder])
     assert player.running(), player.printed
@@ -248,7 +249,7 @@ def test_play_does_not_take_a_recorder_for_a_listener(processes, bench, until, b
 
 def test_play_repeats_until_interrupted_at_its_pace(processes, bench, bags, tmp_path):
     graph = bench("left")
-    heard = graph.listen(MuscleActivation, "emg_envelope", EVERY)
+    heard = graph.listen(EmgEnvelope, "emg_envelope", EVERY)
     # Slow enough for who listens to miss none while it waits for its turn.
     ramp = bags.envelopes(tmp_path / "ramp", {"flexor": np.linspace(0.0, 1.0, 11)}, 10.0)
     player = processes.limb("play", ramp, "--loop", "--rate-factor", "4", "--namespace", "left", "--wait", "300")
@@ -260,6 +261,6 @@ def test_play_repeats_until_interrupted_at_its_pace(processes, bench, bags, tmp_
     messages, took = played(player)
     # Rounded to 0.01 s; on a busy machine it may be later, never earlier.
     assert took >= 0.1 / 4 * (messages - 1) - 0.005
-    assert [m.tick for m in heard[:16]] == [*range(11), *range(5)]
-    assert list(heard[5].activation) == [0.5]
+    assert [round(10 * m.envelope[0]) for m in heard[:16]] == [*range(11), *range(5)]
+    assert list(heard[5].envelope) == [0.5]
     assert heard[5].header.stamp.nanosec == 500_000_000

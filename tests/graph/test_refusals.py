@@ -190,7 +190,7 @@ def test_a_whole_number_is_a_rate_too(bench, limb):
         (["there"], ["there"]),
         (["good.csv"], ["good.csv"]),
         (["bag", "--topic=activation"], ["bag", "activation", "/emg_envelope"]),
-        (["bag", "--topic=joint_states"], ["/joint_states", "sensor_msgs/msg/JointState", "MuscleActivation"]),
+        (["bag", "--topic=joint_states"], ["/joint_states", "sensor_msgs/msg/JointState", "EmgEnvelope"]),
         (["bag", "--rate-factor=0"], ["--rate-factor", "0"]),
         (["bag", "--rate-factor=-1"], ["--rate-factor", "-1"]),
         (["bag", "--rate-factor=nan"], ["--rate-factor", "nan"]),

@@ -20,10 +20,13 @@ SETTINGS = RunSettings("limb.yaml", "drive.yaml", 1000.0, 1.0, "run")
 def test_a_count_that_is_none_is_passed_over(value: str, own: bool, tmp_path: Path) -> None:
     with BagWriter(tmp_path / "run", {}) as bag:
         for identity, text in ((SETTINGS.identity, "3"), (SETTINGS.identity if own else "a stranger", value)):
-            pair = make_message("diagnostic_msgs/msg/KeyValue", key="bad_input", value=text)
+            pairs = [
+                make_message("diagnostic_msgs/msg/KeyValue", key=key, value=given)
+                for key, given in (("bad_input", text), ("run", identity))
+            ]
             status = make_message(
                 "diagnostic_msgs/msg/DiagnosticStatus",
-                level=0, name="/muscle_stack", message="", hardware_id=identity, values=[pair],
+                level=0, name="/muscle_stack", message="", values=pairs,
             )  # fmt: skip
             bag.write("/diagnostics", 0, make_message("diagnostic_msgs/msg/DiagnosticArray", 0, status=[status]))
     with BagReader(tmp_path / "run") as bag:
@@ -32,10 +35,13 @@ def test_a_count_that_is_none_is_passed_over(value: str, own: bool, tmp_path: Pa
 
 def test_what_a_stranger_tells_does_not_count(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "run", {}) as bag:
-        pair = make_message("diagnostic_msgs/msg/KeyValue", key="bad_input", value="3")
+        pairs = [
+            make_message("diagnostic_msgs/msg/KeyValue", key=key, value=given)
+            for key, given in (("bad_input", "3"), ("run", SETTINGS.identity))
+        ]
         status = make_message(
             "diagnostic_msgs/msg/DiagnosticStatus",
-            level=0, name="/muscle_stack", message="", hardware_id=SETTINGS.identity, values=[pair],
+            level=0, name="/muscle_stack", message="", values=pairs,
         )  # fmt: skip
         bag.write("/diagnostics", 0, make_message("diagnostic_msgs/msg/DiagnosticArray", 0, status=[status]))
     with BagReader(tmp_path / "run") as bag:

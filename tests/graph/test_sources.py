@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from limb_msgs.msg import MuscleActivation
+from limb_msgs.msg import EmgEnvelope, LimbState, MuscleActivation
 from rclpy.context import Context
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
@@ -24,6 +24,7 @@ from limb_nodes import cli
 from limb_nodes.bags.read import BagReader
 from limb_nodes.exchange.identity import new_identity
 from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.foundation.topics import exchanged
 from limb_nodes.nodes import live_source
 from limb_nodes.nodes.activation_input import ActivationInput
 from limb_nodes.nodes.distribution import make_executor
@@ -32,7 +33,7 @@ from limb_nodes.nodes.live_readers import EnvelopeReader, RawReader
 from limb_nodes.nodes.live_settings import LiveSettings
 from limb_nodes.nodes.messages import stamp_at, tick_of
 from limb_nodes.nodes.muscle_stack import MuscleStack
-from limb_nodes.nodes.qos import LIVE, STREAM
+from limb_nodes.nodes.qos import EVERY, LIVE, STREAM
 from limb_nodes.nodes.recorder import Recorder
 from limb_nodes.nodes.running import close
 from limb_nodes.nodes.session import run_in_one_process
@@ -79,9 +80,13 @@ def foreign() -> Iterator[Callable[..., Any]]:
         yield make
 
 
-def envelope(values: Any, names: list[str] = MUSCLES, seconds: float = 1.0) -> MuscleActivation:
+def envelope(values: Any, names: list[str] = MUSCLES, seconds: float = 1.0) -> EmgEnvelope:
     stamp = stamp_at(round(seconds * 1e3), Ticks(1e3))
-    return MuscleActivation(header=Header(stamp=stamp), name=names, activation=[float(value) for value in values])
+    return EmgEnvelope(header=Header(stamp=stamp), name=names, envelope=[float(value) for value in values])
+
+
+def limb_state(header: Header, tick: int) -> LimbState:
+    return LimbState(header=header, run=RUN, tick=tick, joint=["joint"], angle=[0.0], velocity=[0.0])
 
 
 class Live:
@@ -90,10 +95,10 @@ class Live:
     def __init__(self, graph: Any, limb: str, **parameters: Any) -> None:
         self.graph = graph
         self.told = graph.listen(DiagnosticArray, "/diagnostics", LIVE)
-        self.heard = graph.listen(MuscleActivation, "activation", STREAM)
+        self.heard = graph.listen(MuscleActivation, exchanged("activation"), STREAM)
         self.node = graph.add(ActivationInput, limb=limb, rate=RATE, mode="realtime", identity=RUN, **parameters)
         self.live = self.node.live
-        self.joints = graph.publisher(JointState, "joint_states", STREAM)
+        self.joints = graph.publisher(LimbState, exchanged("limb_state"), STREAM)
         self.tick = -1
         # The node begins to listen when the limb moves.
         self.step()
@@ -102,8 +107,8 @@ class Live:
     def step(self) -> list[float]:
         """Let the limb move by a tick; the activations that are sent for the next."""
         self.tick += 1
-        header = Header(stamp=stamp_at(self.tick, TICKS), frame_id=RUN)
-        self.joints.publish(JointState(header=header, name=["joint"], position=[0.0], velocity=[0.0]))
+        header = Header(stamp=stamp_at(self.tick, TICKS))
+        self.joints.publish(limb_state(header, self.tick))
         self.graph.until(
             lambda: self.heard and self.heard[-1].tick == self.tick + 1 and self.heard[-1],
             f"activation {self.tick + 1}",
@@ -195,7 +200,7 @@ def test_a_replay_gives_the_activations_of_the_bag(player, bench, limb, bags, fo
     values = recording(times)
     bag = bags.envelopes(tmp_path / "bag", values, player.rate)
     live = Live(bench(), limb)
-    publisher = foreign(MuscleActivation, "emg_envelope", QUALITIES[player.quality])
+    publisher = foreign(EmgEnvelope, "emg_envelope", QUALITIES[player.quality])
     start, sent, found = live.tick, 0, []
     for k in range(SPAN):
         if k >= player.late and (k - player.late) % player.every == 0:
@@ -232,7 +237,7 @@ def test_a_foreign_player_moves_the_limb_as_the_bag_does(bench, limb, bags, tmp_
         node = graph.add(ActivationInput, duration=3.5, channels="EMG 1=flexor,EMG 2=extensor", **common)
         graph.add(MuscleStack, **common)
         dynamics = graph.add(LimbDynamics, await_recorder=True, **common)
-        publisher = player.create_publisher(MuscleActivation, "emg_envelope", BEST_EFFORT)
+        publisher = player.create_publisher(EmgEnvelope, "emg_envelope", BEST_EFFORT)
         graph.until(lambda: node.count_publishers("emg_envelope"), "the player")
         graph.until(lambda: "activation_input" in player.get_node_names(), "the limb")
         recorder = graph.add(Recorder, out=str(tmp_path / "run"), **common)
@@ -242,7 +247,7 @@ def test_a_foreign_player_moves_the_limb_as_the_bag_does(bench, limb, bags, tmp_
             if k >= 0:
                 publisher.publish(envelope([values["extensor"][k], values["flexor"][k]], ["EMG 2", "EMG 1"]))
 
-        graph.probe.create_subscription(JointState, "joint_states", on_states, STREAM)
+        graph.probe.create_subscription(JointState, "joint_states", on_states, EVERY)
         graph.until(lambda: recorder.finished, "the end")
         missed = dynamics.part.missed
         graph.finish(recorder)
@@ -384,7 +389,7 @@ def test_a_channel_takes_the_place_of_a_muscle(made, channels):
 @pytest.mark.parametrize(("on_silence", "left"), [("hold", [0.25, 0.75]), ("zero", [0.0, 0.0])])
 def test_a_source_that_falls_silent_and_comes_back(on_silence, left, bench, limb, foreign, capfd):
     live = Live(bench(), limb, on_silence=on_silence, silence=LONG_SILENCE)
-    publisher = foreign(MuscleActivation, "emg_envelope", BEST_EFFORT)
+    publisher = foreign(EmgEnvelope, "emg_envelope", BEST_EFFORT)
     live.first(publisher, envelope([0.25, 0.75]))
     assert live.step() == [0.25, 0.75]
     live.graph.until(lambda: live.live.silent, "silence to be noticed")
@@ -400,7 +405,7 @@ def test_a_source_that_falls_silent_and_comes_back(on_silence, left, bench, limb
 
 def test_a_silent_source_stops_the_run_if_asked(bench, limb, foreign):
     live = Live(bench(), limb, on_silence="stop", silence=LONG_SILENCE)
-    publisher = foreign(MuscleActivation, "emg_envelope", RELIABLE)
+    publisher = foreign(EmgEnvelope, "emg_envelope", RELIABLE)
     live.first(publisher, envelope([0.25, 0.75]))
     live.step()
     assert live.heard[-1].last_tick == -1
@@ -413,8 +418,8 @@ def test_a_silent_source_stops_the_run_if_asked(bench, limb, foreign):
     assert not live.node.finished
     # Too late: the nodes know of the end.
     publisher.publish(envelope([0.5, 0.5]))
-    header = Header(stamp=stamp_at(last, TICKS), frame_id=RUN)
-    live.joints.publish(JointState(header=header, name=["joint"], position=[0.0], velocity=[0.0]))
+    header = Header(stamp=stamp_at(last, TICKS))
+    live.joints.publish(limb_state(header, last))
     live.graph.until(lambda: live.node.finished, "the end")
     assert list(live.heard[-1].activation) == [0.25, 0.75]
     assert live.live.lost
@@ -441,9 +446,9 @@ def test_a_source_that_never_comes_stops_the_run_if_asked(bench, limb, monkeypat
 def test_sources_of_both_kinds_are_heard_together(bench, limb, foreign):
     """Also if the best-effort one comes last."""
     live = Live(bench(), limb)
-    reliable = foreign(MuscleActivation, "emg_envelope", RELIABLE)
+    reliable = foreign(EmgEnvelope, "emg_envelope", RELIABLE)
     live.first(reliable, envelope([0.1, 0.1]))
-    best_effort = foreign(MuscleActivation, "emg_envelope", BEST_EFFORT)
+    best_effort = foreign(EmgEnvelope, "emg_envelope", BEST_EFFORT)
 
     def heard(publisher: Any, value: float) -> bool:
         publisher.publish(envelope([value, value]))
@@ -459,7 +464,7 @@ def test_a_source_of_another_type_is_named(bench, limb, foreign):
     live = Live(bench(), limb)
     live.graph.until(lambda: "std_msgs/msg/String" in live.live.told(), "the type")
     live.graph.until(lambda: live.reports(), "a report")
-    assert live.live.told().endswith("stranger publishes std_msgs/msg/String; limb_msgs/msg/MuscleActivation is needed")
+    assert live.live.told().endswith("stranger publishes std_msgs/msg/String; limb_msgs/msg/EmgEnvelope is needed")
 
 
 def test_a_pause_of_the_node_is_no_silence(bench, limb, monkeypatch):
@@ -561,7 +566,7 @@ def play_beside(node: Any, case: Case) -> None:
     """Publish after every tick of the limb."""
     if not case.lasts:
         return
-    publisher = node.create_publisher(MuscleActivation, "emg_envelope", QUALITIES[case.quality])
+    publisher = node.create_publisher(EmgEnvelope, "emg_envelope", QUALITIES[case.quality])
 
     begun: list[float] = []
 
@@ -574,13 +579,13 @@ def play_beside(node: Any, case: Case) -> None:
         if seconds - begun[0] < case.lasts:
             publisher.publish(envelope([0.25, 0.75], list(case.names), 100.0 + seconds if case.stamped else 0.0))
 
-    node.create_subscription(JointState, "joint_states", on_states, STREAM)
+    node.create_subscription(JointState, "joint_states", on_states, EVERY)
 
 
 def test_a_source_that_never_comes(runs):
     run = runs["never"]
     assert run.status == 3
-    assert run.reports[0]["input"] == "never came"
+    assert of_source(run)[0]["input"] == "never came"
     assert first_silence(run) <= LATEST
     assert re.search(r"emg_envelope: nothing has come in 0\.[56]", run.said)
     assert re.fullmatch(r"emg_envelope: nothing has come in [\d.]+ s; nobody publishes it", run.live)
@@ -603,16 +608,21 @@ def test_a_source_that_is_best_effort(runs):
 def test_a_source_that_stops(name, left, runs):
     run = runs[name]
     assert run.status == 3
-    first = next(report for report in run.reports if report["input"] == "silent")
+    first = next(report for report in of_source(run) if report["input"] == "silent")
     assert SILENCE <= float(first["age"]) <= LATEST
     assert re.search(r"emg_envelope: stopped 0\.[56]", run.said)
     assert re.fullmatch(r"emg_envelope: stopped [\d.]+ s ago; (\d+) of \1 messages used", run.live)
-    assert run.reports[-1]["input"] == "silent"
+    assert of_source(run)[-1]["input"] == "silent"
     assert last_activation(run) == left
     assert "missing    0\n" in run.printed
     if name == "stops_stop":
         ticks = int(re.findall(r"^ticks +(\d+)", run.printed)[0])
         assert ticks < 300 * RATE
+
+
+def of_source(run: Run) -> list[dict[str, str]]:
+    """What was told of the source; before it is listened to, nothing is."""
+    return [report for report in run.reports if "input" in report]
 
 
 def first_silence(run: Run) -> float:
@@ -643,5 +653,5 @@ def test_a_source_without_stamps(runs):
     run = runs["unstamped"]
     assert run.status == 0
     assert "emg_envelope: stamps are 0" in run.said
-    assert next(count for report in run.reports if (count := int(report["unstamped"]))) == 1, "told with the first"
+    assert next(count for report in of_source(run) if (count := int(report["unstamped"]))) == 1, "told with the first"
     assert re.search(r"stamps are 0 in \d+ messages", run.live)

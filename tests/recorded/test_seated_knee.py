@@ -38,7 +38,7 @@ def from_emg_to_movement(file: Path, folder: Path, *options: str) -> Outcome:
     with BagReader(bag) as reader:
         envelope, angle = reader.table("emg_envelope"), reader.table("reference_angle")
     assert envelope["name"].tolist() == list(CHANNELS)
-    return Outcome(bag, envelope["activation"], np.degrees(angle["position"][:, 0]), knee_angle(run))
+    return Outcome(bag, envelope["envelope"], np.degrees(angle["position"][:, 0]), knee_angle(run))
 
 
 def knee_angle(run: Path) -> np.ndarray:
@@ -107,7 +107,7 @@ def maximum(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     assert main(["emg", str(file), "-o", str(folder / "envelopes")]) == 0
     with BagReader(folder / "envelopes") as reader:
         largest = np.array([channel["maximum"] for channel in reader.run_info()["channels"]])
-        level = largest * reader.table("emg_envelope")["activation"].mean(axis=0)
+        level = largest * reader.table("emg_envelope")["envelope"].mean(axis=0)
     # The mean of rectified Gaussian noise; the band-pass takes a part of its power.
     assert level == pytest.approx(0.92 * FULL * np.sqrt(2.0 / np.pi), rel=0.02)
     return [f"--maximum={name}={value!r}" for name, value in zip(CHANNELS, level.tolist(), strict=True)]

@@ -260,7 +260,7 @@ class TestOptions:
         assert cli.main([*given, "--unit", "n=ms", "--unit", "uV", "--skip", "note", "--header-row", "1"]) == 0
         assert "rate 1000 Hz" in capsys.readouterr().out
         with BagReader(tmp_path / "env") as reader:
-            assert reader.table("emg_envelope")["activation"].shape == (2000, 1)
+            assert reader.table("emg_envelope")["envelope"].shape == (2000, 1)
         assert cli.main(["emg", str(path), "-o", str(tmp_path / "other"), "--time", "m"]) == 2
         assert "--time names 'm'" in capsys.readouterr().err
 

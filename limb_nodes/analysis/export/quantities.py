@@ -30,6 +30,7 @@ class Quantity:
 _UNIT = ("muscle", "unit")
 QUANTITIES: dict[str, tuple[Quantity, ...]] = {
     "limb_msgs/msg/MuscleActivation": (Quantity("activation", "", ""),),
+    "limb_msgs/msg/EmgEnvelope": (Quantity("envelope", "", ""),),
     "limb_msgs/msg/MovementPattern": (
         Quantity("angle", "", "rad", ("joint",)),
         Quantity("velocity", "velocity", "rad/s", ("joint",)),

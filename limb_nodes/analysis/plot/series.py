@@ -269,7 +269,9 @@ def _read_drive(bag: _Bag) -> dict[str, Any]:
     if topic is None:
         return {}
     table = bag.table(topic)
-    drive = bag.cut(topic, table, bag.names(topic, table), "activation")
+    # Bags of former versions have their envelopes as activations.
+    field = "envelope" if "envelope" in table else "activation"
+    drive = bag.cut(topic, table, bag.names(topic, table), field)
     return {"drive": drive, "is_envelope": topic == ENVELOPE_TOPIC}
 
 
