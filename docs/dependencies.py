@@ -35,6 +35,8 @@ PURPOSES = {
     "ros-rosgraph-msgs": "messages of `/clock`",
     "ros-sensor-msgs": "messages of `joint_states`",
     "ros-std-msgs": "messages of identity and progress",
+    "ros-std-srvs": "the service `reset`",
+    "ros-visualization-msgs": "messages of `muscle_markers`",
     "rosbags": "reads bags of any kind",
     "ruamel.yaml": "limbs and waveforms",
     "scipy": "filters, roots",

@@ -63,9 +63,7 @@ def filled(page: str) -> str:
 @cache
 def all_tables() -> dict[str, str]:
     """Every table by name."""
-    topics, parameters = node_tables()
-    tables = {"commands": command_sections(), **key_tables(), "laws": law_sections()}
-    return {**tables, "topics": topics, "node-parameters": parameters}
+    return {"commands": command_sections(), **key_tables(), "laws": law_sections(), **node_tables()}
 
 
 # Commands
@@ -219,10 +217,13 @@ def default(parameter: Parameter) -> str:
 # Nodes
 
 
-def node_tables() -> tuple[str, str]:
-    """The topics with their quality of service, and the parameters of the nodes, as the nodes declare them."""
+def node_tables() -> dict[str, str]:
+    """Topics with their quality of service, services and parameters, as the nodes declare them."""
     with started_nodes() as nodes:
-        return topic_table(nodes), "\n\n".join(node_section(node) for node in nodes)
+        for node in nodes:
+            node.serve()
+        parameters = "\n\n".join(node_section(node) for node in nodes)
+        return {"topics": topic_table(nodes), "services": service_table(nodes), "node-parameters": parameters}
 
 
 @contextmanager
@@ -291,6 +292,18 @@ def topic_table(nodes: Sequence[Any]) -> str:
         ends = [", ".join(entry[role]) or "anyone" for role in ("from", "to")]
         rows.append((f"`{topic}`", f"`{kind}`", *ends, entry["qos"]))
     return table(("topic", "type", "from", "to", "quality of service"), rows)
+
+
+def service_table(nodes: Sequence[Any]) -> str:
+    """Services by name: type and who offers them; those of parameters, which every node of ROS has, are left out."""
+    rows = []
+    for node in nodes:
+        for service in node.services:
+            package = service.srv_type.__module__.split(".")[0]
+            if package != "rcl_interfaces":
+                name = service.service_name.lstrip("/")
+                rows.append((f"`{name}`", f"`{package}/{service.srv_type.__name__}`", f"`{node.get_name()}`"))
+    return table(("service", "type", "of"), rows)
 
 
 def quality(profile: Any) -> str:

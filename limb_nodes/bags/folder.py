@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from itertools import count
 from pathlib import Path, PurePath
 
 from limb_nodes.errors import UserError
@@ -19,6 +21,12 @@ def is_bag_file(path: PurePath) -> bool:
     if suffixes and suffixes[-1] in PACKED:
         suffixes.pop()
     return bool(suffixes) and suffixes[-1] in SUFFIXES
+
+
+def next_free(path: Path) -> Path:
+    """The name of a folder for what follows what is in another one: NAME_reset1, NAME_reset2 and so on."""
+    name = re.sub("_reset[0-9]+$", "", path.name)
+    return next(free for number in count(1) if not (free := path.with_name(f"{name}_reset{number}")).exists())
 
 
 def refuse_existing(path: Path) -> None:

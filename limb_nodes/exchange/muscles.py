@@ -102,22 +102,30 @@ class MusclePart(Part):
             raise RunError(f"{self.limb.file}: stops at {tick * self.ticks.period:g} s, tick {tick}: {why}")
         if self.stepper.look() or tick == self.last_tick:
             self.tell_ranges()
+        values = self.torque.values
+        values["torque"][:], values["slope_angle"][:] = rows[0], rows[1]
+        values["slope_velocity"][:], values["slope_time"][:] = rows[2], rows[3]
+        values["last_tick"][...] = self.last_tick
+        self.torque.publish(tick)
+        # The limb waits for the torque; the states are for those who look on.
         if self.states and tick % self.state_every == 0:
             self.stepper.observe(angle, velocity, excitation)
             for states, copies in self.states:
                 for target, source in copies:
                     target[:] = source
                 states.publish(tick)
-        values = self.torque.values
-        values["torque"][:], values["slope_angle"][:] = rows[0], rows[1]
-        values["slope_velocity"][:], values["slope_time"][:] = rows[2], rows[3]
-        values["last_tick"][...] = self.last_tick
-        self.torque.publish(tick)
         if tick % CHECKPOINT == 0:
             self.send_checkpoint()
         self.finished = 0 <= self.last_tick <= tick
         for old in [key for key in self.inputs if key < tick]:
             del self.inputs[old]
+
+    def muscles(self) -> FloatArray:
+        """What the muscles show at the newest tick [muscles, MUSCLE_OUTPUTS]; looking leaves nothing behind."""
+        kept = self.stepper.remembered
+        shown, _ = self.stepper.observe(self.angle, self.velocity, self.excitation)
+        self.stepper.remember(kept)
+        return shown.copy()
 
     def advance(self, tick: int, angle: FloatArray, velocity: FloatArray) -> Input:
         """Advance the internal states to joint states of a tick; its excitation and drive."""

@@ -31,19 +31,22 @@ from limb_nodes.nodes.distribution import given_parameters, parameter_values
 from limb_nodes.nodes.health import WINDOW, Counts, Steps
 from limb_nodes.nodes.messages import class_of
 from limb_nodes.nodes.onlookers import Onlookers
+from limb_nodes.nodes.priority import HIGHEST, take_priority
 from limb_nodes.nodes.qos import LIVE, STREAM, stream_of
 
 MODES = ("lockstep", "realtime")
 OK, WARN, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.STALE
 # How often a node tells how it does (s).
 REPORT_PERIOD = 1.0
+# How often those who look at the limb get a picture (s).
+VIEW_PERIOD = 0.04
 # What the nodes of a limb declare, all together: a file of parameters may be for all of them.
 PARAMETERS = {
     "allow_laws", "await_recorder", "band", "band_order", "channels", "command", "command_every", "command_timeout",
     "copies", "duration", "emg_rate", "frame_prefix", "identity", "limb", "load_timeout", "low_pass",
-    "low_pass_order", "mains", "maximum", "mode", "on_silence", "out", "publish_clock", "publish_motor_unit_state",
-    "publish_muscle_state", "publish_sarcomere_state", "rate", "resume", "silence", "source", "stall_limit",
-    "state_every",
+    "low_pass_order", "mains", "maximum", "mode", "muscle_colour", "on_silence", "out", "priority", "publish_clock",
+    "publish_motor_unit_state", "publish_muscle_state", "publish_sarcomere_state", "publish_tf", "rate", "resume",
+    "silence", "source", "stall_limit", "state_every",
 }  # fmt: skip
 # How the names of parameters begin that any node of ROS takes.
 ROS_PARAMETERS = ("use_sim_time", "qos_overrides.", "start_type_description_service")
@@ -59,7 +62,8 @@ class LimbNode(Node):
     """A node of one limb at one rate.
 
     part: what it does in a run. failure: why it cannot go on, and the exit status, for whoever spins it; a text,
-    because an error would keep the node and all that it knows alive.
+    because an error would keep the node and all that it knows alive. following: the identity of the run that is to
+    begin in place of this one, once it is known.
     """
 
     part: Part
@@ -67,6 +71,7 @@ class LimbNode(Node):
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
         self.failure: tuple[str, type[UserError]] | None = None
+        self.following = ""
         self._last_complaint = -math.inf
         self._told = 0
         self.steps, self._counts = Steps(), Counts()
@@ -83,6 +88,9 @@ class LimbNode(Node):
         )
         if self.given_identity and not is_identity(self.given_identity):
             raise UserError(f"{name}: the parameter identity is {self.given_identity!r}; {FORM} are needed")
+        self.priority = self.whole(
+            "priority", 0, "real-time priority of all threads of the process (SCHED_FIFO); 0: none", 0, HIGHEST
+        )
         self.resume = self.text("resume", "", "bag of the run that this node goes on with; empty: a new run")
         meaning = "end the run if no tick has come for so long, s"
         limit = self.number("stall_limit", STALL_LIMIT, meaning, STALL.minimum or 0.0, STALL.maximum or 0.0)
@@ -105,6 +113,8 @@ class LimbNode(Node):
         Comes after all parameters are declared. Raises UserError if others are given.
         """
         self.refuse_unknown()
+        if self.priority:
+            take_priority(self.get_name(), self.priority)
         self.part = part
         part.complain = self.complain
         if self.resume:
@@ -132,9 +142,26 @@ class LimbNode(Node):
             self.steps.add(time.perf_counter() - begun)
 
     def on_claim(self, claim: Claim) -> None:
-        """Raise UserError if the node cannot be one of a run that has claimed the namespace."""
-        if self.part.identity in ("", claim.run):
+        """Raise UserError if the node cannot be one of a run that has claimed the namespace.
+
+        A run that replaces that of the node is the one to begin.
+        """
+        if self.part.identity and claim.replaces == self.part.identity and is_identity(claim.run):
+            self.following = claim.run
+        elif self.part.identity in ("", claim.run):
             check_claim(claim, self.get_name(), self.limb, self.ticks, self.mode)
+
+    @property
+    def leaves(self) -> bool:
+        """Whether the node has nothing left to do in its run, for another one follows."""
+        return bool(self.following)
+
+    def parameters_of_following(self) -> dict[str, Any]:
+        """The parameters that are others in the run that follows."""
+        return {"identity": self.following, "resume": ""}
+
+    def serve(self) -> None:
+        """Offer what a person may ask for who has started the node."""
 
     def refuse_unknown(self) -> None:
         """Raise UserError for a parameter that no node of a limb has."""
@@ -157,6 +184,8 @@ class LimbNode(Node):
 
     def on_look(self) -> None:
         """Say what the part waits for if nothing goes on, and give up at last."""
+        if self.following:
+            return
         part, watch = self.part, self.watch
         if said := watch.look(time.monotonic(), part.done, part.awaited()):
             self.get_logger().warning(said)
@@ -173,6 +202,23 @@ class LimbNode(Node):
         if self.failure:
             text, kind = self.failure
             raise RunError(text) if issubclass(kind, RunError) else UserError(text)
+
+    def frame_prefix(self) -> str:
+        """What stands before the names of frames."""
+        space = self.get_namespace().strip("/")
+        return self.text("frame_prefix", space and f"{space}/", "put before the names of frames")
+
+    def show(self, draw: Callable[[], Any], publisher: Any) -> None:
+        """Publish by the wall clock what is drawn of the limb, if anybody looks and it has gone on."""
+        seen = -1
+
+        def look() -> None:
+            nonlocal seen
+            if self.part.done != seen and publisher.get_subscription_count() > 0:
+                seen = self.part.done
+                publisher.publish(draw())
+
+        self.create_timer(VIEW_PERIOD, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def text(self, name: str, default: str, meaning: str) -> str:
         """A parameter that holds a text, fixed at the start."""

@@ -22,11 +22,11 @@ def digest(limb: Limb) -> str:
     return hashlib.sha256(f"{limb.text}\0{limb.code.sha256}".encode()).hexdigest()
 
 
-def new_claim(identity: str, limb: Limb, ticks: Ticks, mode: str) -> Claim:
-    """A claim of the namespace, made now."""
+def new_claim(identity: str, limb: Limb, ticks: Ticks, mode: str, replaces: str = "") -> Claim:
+    """A claim of the namespace, made now; replaces: the identity of the run whose nodes are to begin this one."""
     sec, nanosec = divmod(time.time_ns(), SECOND)
     since = Time(sec=sec, nanosec=nanosec)
-    return Claim(run=identity, since=since, limb=digest(limb), period=ticks.nanoseconds, mode=mode)
+    return Claim(run=identity, replaces=replaces, since=since, limb=digest(limb), period=ticks.nanoseconds, mode=mode)
 
 
 def comes_before(one: Claim, other: Claim) -> bool:

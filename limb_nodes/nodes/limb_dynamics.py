@@ -5,12 +5,13 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import TransformStamped, WrenchStamped
 from limb_msgs.msg import Claim, Recorded
 from rclpy.clock import Clock, ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from limb_nodes.errors import UserError
 from limb_nodes.exchange.held import Held
@@ -25,6 +26,7 @@ from limb_nodes.nodes.onlookers import Onlookers
 from limb_nodes.nodes.outside import command_of, load_of
 from limb_nodes.nodes.qos import BEST_EFFORT, EVERY, LATCHED, LIVE, STREAM
 from limb_nodes.nodes.running import main_of
+from limb_nodes.nodes.transforms import message_class, transforms
 
 # How long a load or a command acts unless another one comes (s).
 TIMEOUT = 0.5
@@ -36,9 +38,9 @@ class LimbDynamics(LimbNode):
 
     In lockstep joint_torque k leads to the state k + 1. In real time a wall timer at the fixed
     rate does, with the newest torque; ticks whose torque is not there in time are counted.
-    It claims the namespace for its run, and ends if another run's claim comes before.
+    It claims the namespace for its run, and ends if another run's claim comes before. The service `reset` begins anew.
     Subscribes `external_load` and `joint_command`; publishes `joint_states`, `movement_pattern`, `robot_description`,
-    `/diagnostics` and, on request, `/clock`.
+    `/diagnostics` and, on request, `/clock` and `/tf`.
     """
 
     part: LimbPart
@@ -56,9 +58,10 @@ class LimbDynamics(LimbNode):
             name: self.number(name, TIMEOUT, f"how long {meaning} {acts}", 0.0, 1e9)
             for name, meaning in (("command_timeout", "a joint_command"), ("load_timeout", "an external_load"))
         }
-        space = self.get_namespace().strip("/")
-        self.prefix = self.text("frame_prefix", space and f"{space}/", "put before the names of frames")
+        self.prefix = self.frame_prefix()
         ticking = self.switch("publish_clock", False, "publish simulation time on /clock")
+        transforming = self.switch("publish_tf", False, "publish the frames of the segments on /tf; needs tf2_msgs")
+        frames = message_class() if transforming else None
         part = LimbPart(
             **self.common, awaits_recorder=awaits, command_every=every, frame_prefix=self.prefix, **timeouts
         )
@@ -81,6 +84,8 @@ class LimbDynamics(LimbNode):
         self.claims = self.create_publisher(Claim, exchanged("claim"), LATCHED)
         self.claim = new_claim(part.identity, self.limb, self.ticks, self.mode)
         self.claims.publish(self.claim)
+        if frames is not None:
+            self.show(lambda: frames(transforms=self.transforms()), self.create_publisher(frames, "/tf", LIVE))
         self.listen(WrenchStamped, "external_load", self.on_load, BEST_EFFORT)
         # Whoever is waited for must not be lost.
         self.listen(JointState, "joint_command", self.on_command, EVERY if every else BEST_EFFORT)
@@ -93,6 +98,11 @@ class LimbDynamics(LimbNode):
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(self.ticks.period, self.on_timer, clock=steady)
 
+    def transforms(self) -> list[TransformStamped]:
+        """The frames of the segments at the newest tick."""
+        stamp = stamp_at(self.part.tick, self.ticks)
+        return transforms(self.limb, self.part.stepper.angle, stamp, self.prefix)
+
     def on_claim(self, claim: Claim) -> None:
         """Give way to a run that claimed before; tell one that did not again whose the namespace is."""
         if claim.run == self.part.identity:
@@ -103,6 +113,18 @@ class LimbDynamics(LimbNode):
                 "namespace, or another ROS_DOMAIN_ID, is needed"
             )
         self.claims.publish(self.claim)
+
+    def serve(self) -> None:
+        """Offer `reset`: the run ends, and its nodes begin another one at tick 0."""
+        self.create_service(Trigger, "reset", self.on_reset)
+
+    def on_reset(self, _: Trigger.Request, answer: Trigger.Response) -> Trigger.Response:
+        """Let all nodes of the run know the identity of the one that follows."""
+        if not self.following:
+            self.following = new_identity()
+            self.claims.publish(new_claim(self.following, self.limb, self.ticks, self.mode, self.part.identity))
+        answer.success, answer.message = True, f"the run {self.following} begins"
+        return answer
 
     def on_progress(self, message: Recorded) -> None:
         """The recorder has every tick up to this one; -1 when it is ready."""

@@ -22,7 +22,7 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
-from limb_nodes.bags.folder import refuse_existing
+from limb_nodes.bags.folder import next_free, refuse_existing
 from limb_nodes.bags.versions import versions
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
@@ -51,6 +51,8 @@ FLUSHED = RECORDER_LAG // 4
 PATIENCE = 5.0
 # How long to wait for a node's answer before it is asked again (s).
 ASK_AGAIN = 1.0
+# The run has no more messages if none has come for so long after its end (s).
+SETTLED = 0.5
 
 
 class Recorder(LimbNode):
@@ -81,6 +83,7 @@ class Recorder(LimbNode):
         self.askers: dict[str, AsyncParameterClient] = {}
         self.asked: dict[str, float] = {}
         self.first_message: float | None = None
+        self.last_message = -math.inf
         self.progress = self.create_publisher(Recorded, exchanged("recorded"), LATCHED)
         self.ticked = {
             topic: self.create_subscription(class_of(topic), exchanged(topic), refuse, STREAM, raw=True)
@@ -118,6 +121,15 @@ class Recorder(LimbNode):
             self.announced = -2
             self.announce()
         super().on_claim(claim)
+
+    @property
+    def leaves(self) -> bool:
+        """Not before the last messages of the run have come."""
+        return super().leaves and time.monotonic() - self.last_message > SETTLED
+
+    def parameters_of_following(self) -> dict[str, Any]:
+        """The run that follows has a bag of its own."""
+        return {**super().parameters_of_following(), "out": str(next_free(Path(self.path)))}
 
     def on_description(self, message: String) -> None:
         """Write the robot description, or keep it until the bag is open."""
@@ -213,8 +225,9 @@ class Recorder(LimbNode):
         come = {
             topic: list(taken(subscription)) for topic, subscription in (*self.ticked.items(), *self.others.items())
         }
-        if self.first_message is None and any(come[topic] for topic in RECORDED):
-            self.first_message = time.monotonic()
+        if any(come[topic] for topic in RECORDED):
+            self.last_message = time.monotonic()
+            self.first_message = self.first_message or self.last_message
         if self.writer is None:
             for topic, messages in come.items():
                 self.early[topic] += messages

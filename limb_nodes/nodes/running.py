@@ -19,6 +19,7 @@ from rclpy.duration import Duration
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.executors import Executor, ExternalShutdownException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_namespace import validate_namespace
 
@@ -85,25 +86,45 @@ def run_guarded(node_class: Callable[..., Any], args: Sequence[str] | None) -> i
     """The same; raises UserError and whatever else goes wrong."""
     interrupt = Interrupt()
     context = Context()
-    node, executor = None, None
     try:
         init_ros(context, args)
-        node = node_class(context=context)
-        executor = make_executor(context)
+        given: dict[str, Any] = {}
+        while given := run_once(node_class, context, given, interrupt):
+            pass
+        return 0
+    finally:
+        close(context, None, [])
+
+
+def run_once(
+    node_class: Callable[..., Any], context: Context, given: dict[str, Any], interrupt: Interrupt
+) -> dict[str, Any]:
+    """Run one node for one run; the parameters with which it begins the run that follows, none if there is no such.
+
+    given: parameters that are others than those of the command line.
+    """
+    node = node_class(context=context, parameter_overrides=[Parameter(key, value=given[key]) for key in given])
+    executor = make_executor(context)
+    try:
         executor.add_node(node)
         # What exists now stays: collecting it again and again would cost ticks.
+        gc.unfreeze()
         gc.collect()
         gc.freeze()
         parent = os.environ.get(PARENT)
-        orphaned = (lambda: str(os.getppid()) != parent) if parent else (lambda: False)
+        if not parent:
+            node.serve()
+        orphaned = (lambda: str(os.getppid()) != parent) if parent else (lambda: bool(node.leaves))
         stays = bool(os.environ.get(STAY))
         spin(executor, lambda: interrupt.wanted or (node.finished and not stays) or bool(node.failure) or orphaned())
         node.raise_failure()
         if not interrupt.wanted:
             linger(executor, node, interrupt)
-        return 0
+        return {} if interrupt.wanted or parent or not node.following else node.parameters_of_following()
     finally:
-        close(context, executor, [node] if node is not None else [])
+        executor.remove_node(node)
+        node.destroy_node()
+        executor.shutdown()
 
 
 def init_ros(context: Context, args: Sequence[str] | None = None) -> None:

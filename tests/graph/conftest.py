@@ -89,6 +89,10 @@ class Process:
     def printed(self) -> str:
         return self.out.read_text()
 
+    def report(self) -> str:
+        """For a test that fails: what it is, how it stands and what it has said."""
+        return f"{self.handle.args}\n  exit status {self.handle.poll()}\n{self.printed[-2000:]}{self.all_said[-2000:]}"
+
     def end(self) -> None:
         """End it, whatever state it is in."""
         if self.running():
@@ -112,8 +116,10 @@ class Processes:
         self.folder = folder
         self.all: list[Process] = []
 
-    def start(self, *arguments: str) -> Process:
-        child = Process([sys.executable, *arguments], self.folder / f"process{len(self.all)}")
+    def start(self, *arguments: str, on: str = "") -> Process:
+        """A program of Python; on: the network namespace that it is to be in, if it is another one."""
+        there = ["ip", "netns", "exec", on] if on else []
+        child = Process([*there, sys.executable, *arguments], self.folder / f"process{len(self.all)}")
         self.all.append(child)
         return child
 
@@ -121,7 +127,7 @@ class Processes:
         """The command `limb`."""
         return self.start("-m", "limb_nodes.cli", *map(str, arguments))
 
-    def node(self, name: str, namespace: str = "", script: bool = False, **parameters: Any) -> Process:
+    def node(self, name: str, namespace: str = "", script: bool = False, on: str = "", **parameters: Any) -> Process:
         """One node, as a person starts it; script: the installed one that `ros2 run` takes."""
         how = [str(Path(sys.prefix, "lib/limb_nodes", name))] if script else ["-m", f"limb_nodes.nodes.{name}"]
         given = ["--ros-args"]
@@ -129,7 +135,7 @@ class Processes:
             given += ["-r", f"__ns:=/{namespace}"]
         for key, value in parameters.items():
             given += ["-p", f"{key}:={str(value).lower() if isinstance(value, bool) else value}"]
-        return self.start(*how, *given)
+        return self.start(*how, *given, on=on)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -143,6 +149,7 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
     started = Processes(tmp_path)
     yield started
     for child in started.all:
+        print(child.report())
         child.end()
 
 

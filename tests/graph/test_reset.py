@@ -1,0 +1,64 @@
+"""The service `reset`: the nodes that a person has started begin the run anew, by themselves."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+from limb_msgs.msg import MovementPattern
+from std_srvs.srv import Trigger
+
+from limb_nodes.bags.folder import next_free
+from limb_nodes.nodes.qos import LIVE
+
+NODES = ("activation_input", "muscle_stack", "limb_dynamics", "recorder")
+RESETS = 3
+
+
+@pytest.fixture
+def started(limb, waves, processes, tmp_path):
+    """The nodes of a run that is longer than the test, by name."""
+    given = {
+        "activation_input": {"source": waves, "duration": 3600.0},
+        "limb_dynamics": {"await_recorder": True},
+        "recorder": {"out": tmp_path / "run"},
+    }
+    return {name: processes.node(name, limb=limb, rate=1000.0, **given.get(name, {})) for name in NODES}
+
+
+def test_all_nodes_begin_the_run_anew_and_the_recorder_another_bag(started, bags, bench, tmp_path):
+    graph = bench()
+    heard = graph.listen(MovementPattern, "movement_pattern", LIVE)
+    reset = graph.probe.create_client(Trigger, "reset")
+    runs: list[str] = []
+    for number in range(RESETS + 1):
+        graph.until(lambda: heard and heard[-1].run not in runs and heard[-1].tick > 100, f"run {number}")
+        runs.append(heard[-1].run)
+        if number == RESETS:
+            break
+        graph.until(reset.service_is_ready, "the service")
+        answer = reset.call_async(Trigger.Request())
+        graph.until(answer.done, "its answer")
+        assert answer.result().success
+        following = answer.result().message.split()[2]
+        graph.until(lambda following=following: heard[-1].run == following, "the run that was named")
+    assert all(child.running() for child in started.values())
+    for name in "limb_dynamics", "recorder", "muscle_stack", "activation_input":
+        started[name].signal(signal.SIGTERM)
+        assert (started[name].wait(), started[name].said) == (0, "")
+    folders = [tmp_path / "run", *(tmp_path / f"run_reset{number + 1}" for number in range(RESETS))]
+    tables = [bags.decoded(folder, ("movement_pattern",))["movement_pattern"] for folder in folders]
+    assert [str(table["run"]) for table in tables] == runs
+    least = min(len(table["tick"]) for table in tables)
+    for table in tables:
+        assert table["tick"].tolist() == list(range(len(table["tick"])))
+        assert (table["angle"][:least] == tables[0]["angle"][:least]).all()
+    assert least > 101
+
+
+def test_what_follows_has_a_name_of_its_own(tmp_path):
+    (tmp_path / "run_reset2").mkdir()
+    assert next_free(tmp_path / "run").name == "run_reset1"
+    assert next_free(tmp_path / "run_reset1").name == "run_reset1"
+    (tmp_path / "run_reset1").mkdir()
+    assert next_free(tmp_path / "run_reset2").name == "run_reset3"
