@@ -295,12 +295,12 @@ def topic_table(nodes: Sequence[Any]) -> str:
 
 
 def service_table(nodes: Sequence[Any]) -> str:
-    """Services by name: type and who offers them; those of parameters, which every node of ROS has, are left out."""
+    """Services by name: type and who offers them; those that every node of ROS has are left out."""
     rows = []
     for node in nodes:
         for service in node.services:
             package = service.srv_type.__module__.split(".")[0]
-            if package != "rcl_interfaces":
+            if package not in ("rcl_interfaces", "type_description_interfaces"):
                 name = service.service_name.lstrip("/")
                 rows.append((f"`{name}`", f"`{package}/{service.srv_type.__name__}`", f"`{node.get_name()}`"))
     return table(("service", "type", "of"), rows)
