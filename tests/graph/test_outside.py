@@ -11,6 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -296,3 +297,24 @@ def test_bytes_of_joint_states_are_those_of_ros(bench, limb):
     message = deserialize_message(data, JointState)
     assert list(message.name) == ["joint"]
     assert len(serialize_message(message)) - len(data) in range(4)
+
+
+def test_a_bag_offers_its_topics_as_they_are_offered_live(bench, limb, waves, tmp_path):
+    """So that who subscribes a limb that is played gets what it gets of one that runs."""
+    graph = bench()
+    nodes = run_of(graph, limb, tmp_path / "run", waves)
+    graph.until(lambda: nodes["recorder"].finished, "the end")
+    live = {end.topic_name: end.qos_profile for node in nodes.values() for end in node.publishers}
+    graph.finish(nodes["recorder"])
+    compared = []
+    with Reader(tmp_path / "run") as bag:
+        for connection in bag.connections:
+            if (profile := live.get(connection.topic)) is None:
+                continue
+            (offered,) = connection.ext.offered_qos_profiles
+            for field in "history", "reliability", "durability":
+                assert getattr(offered, field).name == getattr(profile, field).name, f"{connection.topic}: {field}"
+            assert offered.depth == profile.depth, connection.topic
+            compared.append(connection.topic)
+    public = {"/activation", "/joint_states", "/joint_torque", "/movement_pattern", "/muscle_state", "/diagnostics"}
+    assert public | {"/motor_unit_state", "/sarcomere_state", "/robot_description"} == set(compared)
