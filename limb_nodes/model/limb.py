@@ -33,7 +33,7 @@ class MotorUnit:
     """A motor unit: the parameters of `levels.motor_unit.PARAMETERS`, its threshold and laws.
 
     values: includes `unit_threshold` (activation at which it fires) and `unit_rank` (its place in
-        the recruitment order, from 0 to 1).
+        the recruitment order over the number of units, i/n: 1 for the last).
     laws: by process: sarcomere, force_length, force_frequency, passive_force, recruitment.
     """
 

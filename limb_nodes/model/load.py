@@ -227,9 +227,9 @@ def read_muscle(
     ordered = [unit for _, unit in units]
     section.finish()
     thresholds = unit_thresholds([unit.values["pcsa"] for unit in ordered], threshold)
-    for rank, (unit, unit_threshold) in enumerate(zip(ordered, thresholds, strict=True)):
+    for place, (unit, unit_threshold) in enumerate(zip(ordered, thresholds, strict=True), 1):
         unit.values["unit_threshold"] = unit_threshold
-        unit.values["unit_rank"] = rank / max(1, len(ordered) - 1)
+        unit.values["unit_rank"] = place / len(ordered)
     return Muscle(name, joints.index(joint), role, threshold, laws, tuple(ordered), section.place)
 
 

@@ -320,12 +320,14 @@ def test_limb_holds_every_alternative(limb):
     assert {(process, name) for process, laws in REGISTRY.items() for name in laws} - chosen == by_report
 
 
-def test_alternatives_run_whole_and_stepped_alike(limb):
-    given = excitation(1000.0, 1.5)
-    whole = WholeModel(limb).simulate(given, 1000.0)
-    angles, internal = stepped(limb, given, 1000.0)
+@pytest.mark.parametrize(("rate", "apart"), [(1000.0, 3e-4), (4000.0, 4e-5)])
+def test_alternatives_run_whole_and_stepped_alike(rate, apart, limb):
+    """A unit that joins jumps to its lowest frequency within a tick; what that costs falls with the tick."""
+    given = excitation(rate, 1.5)
+    whole = WholeModel(limb).simulate(given, rate)
+    angles, internal = stepped(limb, given, rate)
     assert np.ptp(whole.angle) > 0.3
-    assert angles == pytest.approx(whole.angle[:, 0], abs=1.5e-4)
+    assert angles == pytest.approx(whole.angle[:, 0], abs=apart)
     assert internal == pytest.approx(whole.internal[-1], abs=2e-3)
 
 
@@ -344,3 +346,21 @@ def test_virtual_work_through_the_whole_muscle(limb):
     power = movement.muscle["muscle_torque"] * movement.velocity
     shortening = movement.muscle["muscle_force"] * movement.muscle["muscle_tendon_velocity"]
     assert power == pytest.approx(shortening, rel=1e-9, abs=1e-12)
+
+
+def test_fuglevand_thresholds_of_four_units(tmp_path):
+    """RTE_i = exp(i ln(RR)/n) for i from 1 to n (the paper's equation 1), with the last one at 0.53."""
+    arm = Path(__file__).resolve().parents[2] / "params" / "arm.yaml"
+    file = tmp_path / "arm.yaml"
+    file.write_text(arm.read_text().replace("recruitment: {law: linear}", "recruitment: {law: fuglevand}"))
+    for muscle in load_limb(file).muscles:
+        joins = []
+        for unit in muscle.units:
+            law = unit.laws["recruitment"]
+            rest = [unit.values[name] for name in ("unit_rank", "minimum_frequency", "maximum_frequency")]
+            low, high = 0.0, 1.0
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                low, high = (low, middle) if law.law(middle, *rest, *law.values.values()) > 0.0 else (middle, high)
+            joins.append(high)
+        assert joins == pytest.approx([0.04136, 0.09677, 0.22649, 0.53], rel=1e-3)

@@ -146,7 +146,7 @@ class TestPennation:
         length = 19.8e-3
         area, optimum = self.triangle(fibre, length, math.radians(degrees))
         angle = aponeurosis.pennation_angle(optimum - 6e-3, length, area)
-        shorter = aponeurosis.fibre_length(optimum - 6e-3, length, angle)
+        shorter = aponeurosis.fibre_length(optimum - 6e-3, length, area)
         assert 0.89 / 2.14 <= shorter / fibre <= 1.52 / 1.92
         # Fibres turn away from the aponeurosis as they shorten, by the constant area.
         assert math.sin(angle) / math.sin(math.radians(degrees)) == pytest.approx(fibre / shorter, rel=1e-9)

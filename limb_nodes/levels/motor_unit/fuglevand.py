@@ -1,7 +1,7 @@
 """Recruitment with exponentially spaced thresholds, of the motor-unit pool of Fuglevand et al.
 
 Symbols of the paper: RR threshold_range, RTE_i the excitation at which unit i joins,
-E_max the greatest excitation, MFR minimum_frequency, PFR maximum_frequency.
+E_max the greatest excitation, MFR minimum_frequency, PFR maximum_frequency; i/n unit_rank.
 Many units join early and few late. All rise with the same slope, so early units reach their
 greatest frequency before the last ones do. The muscle's activation_threshold plays no part.
 """
@@ -43,7 +43,7 @@ def fuglevand(
     threshold_range: float,
     full_recruitment: float,
 ) -> float:
-    """Stimulation frequency (Hz): 0 below RTE_i = RTE_n RR^(rank - 1), then linear up to f_max."""
+    """Stimulation frequency (Hz): 0 below RTE_i = RTE_n RR^(i/n - 1), then linear up to f_max."""
     threshold: float = full_recruitment * threshold_range ** (unit_rank - 1.0)
     if activation < threshold:
         return 0.0

@@ -31,10 +31,16 @@ def pennation_angle(muscle_length: float, aponeurosis_length: float, area: float
 
 
 @equation("2.34", "fibre_length")
-def fibre_length(muscle_length: float, aponeurosis_length: float, pennation_angle: float) -> float:
-    """Fibre length (m) by the law of cosines."""
-    across = aponeurosis_length * math.sin(pennation_angle)
-    return math.sqrt(muscle_length * muscle_length - across * across) - aponeurosis_length * math.cos(pennation_angle)
+def fibre_length(muscle_length: float, aponeurosis_length: float, area: float) -> float:
+    """Fibre length (m) by the law of cosines.
+
+    The form of 2.34 with 2.51 put in, l_F^2 = l_A^2 + l_M^2 - 2 sqrt(l_A^2 l_M^2 - A^2), without its cancellation. Of
+    the angle alone 2.34 has two roots once the muscle is shorter than the aponeurosis. Raises ValueError (NaN if
+    compiled) if the two lengths cannot span the area.
+    """
+    spanned = muscle_length * aponeurosis_length
+    along = muscle_length - aponeurosis_length
+    return math.sqrt(along * along + 2.0 * area * area / (spanned + math.sqrt(spanned * spanned - area * area)))
 
 
 @equation("2.40", "aponeurosis_angle")
