@@ -22,6 +22,11 @@ from limb_nodes.model.chain import BASE_ANGLE, COUPLING, GRAVITY_X, GRAVITY_Y, L
 OPTIONS = {"error_model": "numpy", "cache": True, "forceinline": True}
 
 FORCE_X, FORCE_Y, TIP_TORQUE = 0, 1, 2
+# What an impulse may miss, of the sum of its parts.
+ROUNDING = 1e-13
+# A joint that would leave its limit more slowly (rad/s) stays: two that throw each other off in turn, ever more slowly,
+# would do so without end.
+REST = 1e-7
 # Rows of the numbers between the stages of an evaluation: torque of motion, gravity and load about each joint (N m);
 # cosine and sine of each segment's absolute angle, and its speed (rad/s); then n rows of the inertia matrix of the
 # joints (kg m^2), which its Cholesky factor replaces.
@@ -125,23 +130,74 @@ def reaction(world, segments, load, y, torque, acceleration, out, scratch):
 
 
 @njit(**OPTIONS)
-def impact(world, segments, load, y, locked, scratch):
-    """Stop the locked joints dead: the velocities in y become those after the impulse.
+def stop(world, segments, load, y, locked, after, scratch):
+    """The velocities after [n] of an impulse that stops the locked joints dead.
 
     The momenta of the free joints are kept: M_ff v_f' = M_ff v_f + M_fl v_l.
     """
     n = scratch.shape[1]
     joint_equations(world, segments, load, y, scratch)
-    momentum = scratch[BIAS]
     for k in range(n):
-        total = 0.0
-        for other in range(n):
-            total += scratch[INERTIA + k, other] * y[n + other]
-        momentum[k] = total
+        after[k] = momentum_of(k, y[n:], scratch)
     factor_free(locked, scratch)
-    solve_free(locked, momentum, scratch)
+    solve_free(locked, after, scratch)
+
+
+@njit(**OPTIONS)
+def momentum_of(joint, velocity, scratch):
+    """The momentum about a joint (N m s) at velocities [n]."""
+    total = 0.0
+    for other in range(scratch.shape[1]):
+        total += scratch[INERTIA + joint, other] * velocity[other]
+    return total
+
+
+@njit(**OPTIONS)
+def wrong_stop(y, locked, side, after, scratch):
+    """The first joint on its limit that is held though its limit would have to pull, or flies through it; -1 if none.
+
+    Needs the inertia matrix in scratch.
+    """
+    n = scratch.shape[1]
     for k in range(n):
-        y[n + k] = momentum[k]
+        if side[k] == 0.0:
+            continue
+        if locked[k] == 0.0:
+            if side[k] * after[k] > 0.0:
+                return k
+            continue
+        pull, size = 0.0, 0.0
+        for other in range(n):
+            part = scratch[INERTIA + k, other] * (after[other] - y[n + other])
+            pull += part
+            size += abs(part)
+        if side[k] * pull > ROUNDING * size + REST * scratch[INERTIA + k, k]:
+            return k
+    return -1
+
+
+@njit(**OPTIONS)
+def impact(world, segments, load, y, locked, work, scratch):
+    """The velocities in y become those after the impulses of the limits, on which the locked joints are.
+
+    A limit only pushes: a joint that it would have to hold flies off, and is locked no more. That is a linear
+    complementarity problem, impulse against velocity, whose matrix is positive definite; Murty's pivots, of the first
+    joint that is wrong each time, end with its one solution (Mathematical Programming 7 (1974) 138).
+    work: [2 n or more].
+    """
+    n = scratch.shape[1]
+    after, side = work[:n], work[n:]
+    for k in range(n):
+        side[k] = locked[k]
+    for _ in range(2**n + 1):
+        stop(world, segments, load, y, locked, after, scratch)
+        joint_equations(world, segments, load, y, scratch)
+        wrong = wrong_stop(y, locked, side, after, scratch)
+        if wrong < 0:
+            break
+        locked[wrong] = side[wrong] if locked[wrong] == 0.0 else 0.0
+    for k in range(n):
+        y[n + k] = after[k]
 
 
 @njit(**OPTIONS)

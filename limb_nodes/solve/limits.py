@@ -270,7 +270,7 @@ def find_event(t, h, method_, work_, control_, problem_):
 # t, method, work, control, problem
 @callback(f8, method_pointer, numbers, control_pointer, problem_pointer)
 def take_effect(t, method_, work_, control_, problem_):
-    """What an event does to the state: an impact stops its joint and jolts the others."""
+    """What an event does to the state: an impact stops its joint, jolts the others, and may throw some off a limit."""
     method, problem = carray(method_, 1)[0], carray(problem_, 1)[0]
     work = work_at(work_, problem, method)
     control = carray(control_, 1)[0]
