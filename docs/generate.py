@@ -136,8 +136,8 @@ def process_table() -> str:
     for contract in CONTRACTS.values():
         place = contract.section.replace("_", " ")
         laws = ", ".join(f"[`{name}`](laws.md#{anchor(contract.process, name)})" for name in REGISTRY[contract.process])
-        absent = contract.absent or contract.default
-        rows.append((f"`{contract.process}`", place, contract.meaning, laws, f"`{absent}`"))
+        absent = "none" if contract.owner == "joint" else f"`{contract.absent or contract.default}`"
+        rows.append((f"`{contract.process}`", place, contract.meaning, laws, absent))
     return table(("key", "of a", "gives", "laws", "without the key"), rows)
 
 

@@ -4,7 +4,7 @@ Importing this package registers every law that comes with it.
 """
 
 from limb_nodes.foundation.parameter import Parameter
-from limb_nodes.levels import limb, motor_unit, muscle, sarcomere
+from limb_nodes.levels import joint, limb, motor_unit, muscle, sarcomere
 from limb_nodes.levels.contracts import CONTRACTS, MUSCLE_PROCESSES, REGISTRY, UNIT_PROCESSES, Contract, law, register
 from limb_nodes.levels.equation import Equation, Law, State, equation, equation_of
 
@@ -20,6 +20,7 @@ __all__ = [
     "State",
     "equation",
     "equation_of",
+    "joint",
     "law",
     "limb",
     "motor_unit",

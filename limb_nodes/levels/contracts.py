@@ -29,7 +29,7 @@ from limb_nodes.levels.equation import Equation, Law, ScalarFunction, State
 class Contract:
     """The interface of one process.
 
-    owner: "motor_unit" or "muscle", of which each has a law of this process.
+    owner: "motor_unit" or "muscle", of which each has a law of this process, or "joint", which has any number.
     level: the level of the report that holds the equations: "sarcomere", "motor_unit", "muscle", or its sub-level
         "tendon". A law of the last two is chosen in a muscle's section of a limb's file.
     default: the law of a section that names none. absent: the law if there is no section.
@@ -47,7 +47,9 @@ class Contract:
 
     @property
     def section(self) -> str:
-        """The section of a limb's file that chooses the law: "motor_unit" or "muscle"."""
+        """The section of a limb's file that chooses the law: "motor_unit", "muscle" or "segment"."""
+        if self.owner == "joint":
+            return "segment"
         return "muscle" if self.level in ("muscle", "tendon") else "motor_unit"
 
 
@@ -177,6 +179,16 @@ CONTRACTS: dict[str, Contract] = {
             ("activation",),
             "none",
             ("rises with the excitation and is not negative, if the law has no states",),
+        ),
+        Contract(
+            "tissue",
+            "joint",
+            "limb",
+            "moment of what is around a joint beside muscles, a list of laws whose moments add up",
+            ("joint_angle", "joint_velocity"),
+            ("passive_moment",),
+            "linear",
+            ("what the velocity adds acts against it", "acts somewhere in the joint's range", "no states"),
         ),
     )
 }

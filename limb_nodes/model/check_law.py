@@ -14,6 +14,7 @@ from limb_nodes.levels import CONTRACTS, Equation
 from limb_nodes.levels.sarcomere.lengths import optimal_sarcomere_length
 from limb_nodes.levels.tangent import UnsupportedCode, refuse_unsupported
 from limb_nodes.model.check_muscle_laws import MUSCLE_CHECKS
+from limb_nodes.model.check_tissue_laws import TISSUE_CHECKS
 from limb_nodes.model.check_unit_laws import UNIT_CHECKS
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
@@ -21,11 +22,15 @@ from limb_nodes.model.probe import BrokenLaw
 from limb_nodes.model.system import CONSTANTS
 
 # By process.
-CHECKS = {**UNIT_CHECKS, **MUSCLE_CHECKS}
+CHECKS = {**UNIT_CHECKS, **MUSCLE_CHECKS, **TISSUE_CHECKS}
 
 
 def check_laws(limb: Limb) -> None:
     """Refuse a limb with a law that does not keep its contract. Raises UserError, one line."""
+    for segment in limb.segments:
+        lowest, highest = segment.joint_range or (-math.pi, math.pi)
+        for tissue in segment.tissue:
+            check_law(limb.file, tissue, {"lowest_angle": lowest, "highest_angle": highest})
     for muscle in limb.muscles:
         for chosen in muscle.laws.values():
             check_law(limb.file, chosen, muscle_context(chosen, muscle, limb))

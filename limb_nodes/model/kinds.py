@@ -1,4 +1,4 @@
-"""Kinds of motor units and muscles: those with the same laws, and when which of their equations is evaluated."""
+"""Kinds of motor units, muscles and tissues: those with the same laws, and when each equation is evaluated."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from limb_nodes.levels import Law
-from limb_nodes.model.system import BoundEquation, System, muscle_system, unit_system
+from limb_nodes.model.system import BoundEquation, System, muscle_system, tissue_system, unit_system
 
 
 @dataclass(frozen=True)
@@ -157,3 +157,31 @@ class MuscleKind:
                 found.add(name)
                 waiting += definitions[name].symbols
         return found
+
+
+@dataclass(frozen=True)
+class TissueKind:
+    """Tissues of joints with the same law. Stages as in `UnitKind`: `load`, and `loop` for the rest."""
+
+    law: Law
+
+    @cached_property
+    def system(self) -> System:
+        """The tissue's equations."""
+        return tissue_system(self.law)
+
+    @cached_property
+    def stages(self) -> dict[str, list[BoundEquation]]:
+        """Equations by stage, each in the order of evaluation."""
+        depends = self.system.dependence()
+        stages: dict[str, list[BoundEquation]] = {"load": [], "loop": []}
+        for bound in self.system.ordered():
+            stages["loop" if depends[bound.defines] else "load"].append(bound)
+        return stages
+
+    @cached_property
+    def columns(self) -> list[str]:
+        """Parameters and computed parameters that compiled code reads."""
+        used = {symbol for bound in self.stages["loop"] for symbol in bound.symbols}
+        loaded = [bound.defines for bound in self.stages["load"]]
+        return [name for name in (*self.system.parameters, *loaded) if name in used]

@@ -18,7 +18,8 @@ from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.records import Record, whole_numbers
 from limb_nodes.levels import MUSCLE_PROCESSES, UNIT_PROCESSES
 from limb_nodes.model.chain import segments_of, world_of
-from limb_nodes.model.kinds import MuscleKind, UnitKind
+from limb_nodes.model.chosen import ChosenLaw
+from limb_nodes.model.kinds import MuscleKind, TissueKind, UnitKind
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
 from limb_nodes.model.system import BoundEquation, System
 
@@ -32,6 +33,8 @@ MUSCLE_RECORD = whole_numbers(
 )
 GROUP_RECORD = whole_numbers("kind", "parameters", "state", "drive", "scratch")
 UNIT_RECORD = whole_numbers("kind", "parameters", "group", "muscle")
+# Of a tissue: its kind, its joint and the first of its parameters.
+TISSUE_RECORD = whole_numbers("kind", "joint", "parameters")
 
 # So many groups of a muscle get code of their own; more share a loop, which is slower and compiles faster.
 MOST_WRITTEN_OUT = 3
@@ -43,8 +46,10 @@ class Layout:
 
     model: what does not change during a solve, one record with these fields:
         world, segments: float64 [3], [4 + n, n], the chain, rows as in `limb_nodes.model.chain`.
-        parameters: float64, a row per muscle, group and unit, SI units; which numbers, its kind tells (`columns`).
-        muscles, groups, units: one record for each, `MUSCLE_RECORD`, `GROUP_RECORD`, `UNIT_RECORD`.
+        parameters: float64, a row per muscle, group, unit and tissue, SI units; which numbers, its kind tells
+            (`columns`).
+        muscles, groups, units, tissues: one record for each, `MUSCLE_RECORD`, `GROUP_RECORD`, `UNIT_RECORD`,
+            `TISSUE_RECORD`.
     initial_states: float64 [internal states], initial values of tendons, aponeuroses and laws.
     state_names, state_scales: of the same.
     drives: how many numbers the input becomes (`limb_nodes.solve.whole.WholeModel.drives`).
@@ -54,6 +59,7 @@ class Layout:
     limb: Limb
     muscle_kinds: tuple[MuscleKind, ...]
     unit_kinds: tuple[UnitKind, ...]
+    tissue_kinds: tuple[TissueKind, ...]
     model: Record
     initial_states: FloatArray
     state_names: tuple[str, ...]
@@ -80,6 +86,11 @@ class Layout:
     def units(self) -> int:
         """Number of motor units."""
         return len(self.model.units)
+
+    @property
+    def tissues(self) -> int:
+        """Number of tissues of all joints."""
+        return len(self.model.tissues)
 
     @property
     def states(self) -> int:
@@ -117,6 +128,13 @@ def muscle_values(muscle: Muscle, kind: MuscleKind) -> dict[str, float]:
     return values
 
 
+def tissue_values(tissue: ChosenLaw, kind: TissueKind) -> dict[str, float]:
+    """All given and computed parameters of a tissue, by symbol."""
+    values = {f"tissue__{name}": value for name, value in tissue.values.items()}
+    define(kind.stages["load"], values)
+    return values
+
+
 SUMMED = ("parallel_sarcomeres", "maximum_passive_force")
 
 
@@ -142,9 +160,11 @@ class Packer:
         self.parameters: list[float] = []
         self.muscle_kinds = list(known.muscle_kinds) if known else []
         self.unit_kinds = list(known.unit_kinds) if known else []
+        self.tissue_kinds = list(known.tissue_kinds) if known else []
         self.muscles: list[tuple[int, ...]] = []
         self.groups: list[tuple[int, ...]] = []
         self.units: list[tuple[int, ...]] = []
+        self.tissues: list[tuple[int, ...]] = []
         self.initial: list[float] = []
         self.names: list[str] = []
         self.scales: list[float] = []
@@ -222,6 +242,11 @@ class Packer:
             self.groups.append((group.kind, offset, group.state, group.drive, group.scratch))
         return tuple(group.kind for group in groups.values())
 
+    def add_tissue(self, joint: int, tissue: ChosenLaw) -> None:
+        """Append a tissue of a joint."""
+        index, kind = find_or_add(self.tissue_kinds, TissueKind(tissue.law), lambda known: known.law)
+        self.tissues.append((index, joint, self.row(kind.columns, tissue_values(tissue, kind))))
+
     def layout(self) -> Layout:
         """The arrays."""
         world, segments = world_of(self.limb), segments_of(self.limb)
@@ -234,6 +259,7 @@ class Packer:
                     ("muscles", MUSCLE_RECORD, (len(self.muscles),)),
                     ("groups", GROUP_RECORD, (len(self.groups),)),
                     ("units", UNIT_RECORD, (len(self.units),)),
+                    ("tissues", TISSUE_RECORD, (len(self.tissues),)),
                 ]
             )
         )
@@ -242,10 +268,12 @@ class Packer:
         model.muscles[:] = self.muscles
         model.groups[:] = self.groups
         model.units[:] = self.units
+        model.tissues[:] = self.tissues
         return Layout(
             limb=self.limb,
             muscle_kinds=tuple(self.muscle_kinds),
             unit_kinds=tuple(self.unit_kinds),
+            tissue_kinds=tuple(self.tissue_kinds),
             model=model,
             initial_states=np.array(self.initial, dtype=np.float64),
             state_names=tuple(self.names),
@@ -286,15 +314,19 @@ def build_layout(limb: Limb, known: Layout | None = None) -> Layout:
     packer = Packer(limb, known)
     for number, muscle in enumerate(limb.muscles):
         packer.add_muscle(number, muscle)
+    for joint, segment in enumerate(limb.segments):
+        for tissue in segment.tissue:
+            packer.add_tissue(joint, tissue)
     return packer.layout()
 
 
 def same_structure(one: Layout, other: Layout) -> bool:
     """Whether two limbs have one program and every number at the same place."""
-    records = ("muscles", "groups", "units")
+    records = ("muscles", "groups", "units", "tissues")
     return (
         one.muscle_kinds == other.muscle_kinds
         and one.unit_kinds == other.unit_kinds
+        and one.tissue_kinds == other.tissue_kinds
         and one.model.kind == other.model.kind
         and all(np.array_equal(getattr(one.model, name), getattr(other.model, name)) for name in records)
     )

@@ -14,7 +14,7 @@ class Segment:
     """A segment and the joint at its proximal end. SI units, radians.
 
     joint_range: lowest and highest joint angle, or None if the joint turns freely.
-    angle, velocity: of the joint at the start.
+    angle, velocity: of the joint at the start. tissue: laws whose moments on the joint add up.
     """
 
     name: str
@@ -26,6 +26,7 @@ class Segment:
     angle: float
     velocity: float
     joint_range: tuple[float, float] | None
+    tissue: tuple[ChosenLaw, ...] = ()
 
 
 @dataclass(frozen=True)

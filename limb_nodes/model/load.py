@@ -18,7 +18,7 @@ from limb_nodes.levels import CONTRACTS, MUSCLE_PROCESSES, UNIT_PROCESSES, motor
 from limb_nodes.levels.motor_unit.recruitment import unit_thresholds
 from limb_nodes.model.check import check_geometry, check_unit
 from limb_nodes.model.check_law import check_laws
-from limb_nodes.model.choice import choose_law
+from limb_nodes.model.choice import choose_law, read_law
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.consent import require_consent
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
@@ -151,7 +151,7 @@ def unshared(content: Any) -> Any:
 def build_limb(content: Any, file: str, text: str, code: UserCode | None = NO_CODE) -> Limb:
     """Check the content of a limb's file and make a `Limb` of it. code: the user's own, which runs; see `outline`."""
     top = Section(file, "", content)
-    segments = tuple(read_segment(section) for section in top.sections("segments", required=True))
+    segments = tuple(read_segment(section, code) for section in top.sections("segments", required=True))
     joints = [segment.joint for segment in segments]
     refuse_duplicates(top, "segments", "joint", joints)
     refuse_duplicates(top, "segments", "name", [segment.name for segment in segments])
@@ -183,7 +183,7 @@ def build_limb(content: Any, file: str, text: str, code: UserCode | None = NO_CO
     return limb
 
 
-def read_segment(section: Section) -> Segment:
+def read_segment(section: Section, code: UserCode | None) -> Segment:
     """One entry of `segments`."""
     values = {parameter.name: present(section.number(parameter)) for parameter in SEGMENT_PARAMETERS}
     joint_range = None
@@ -196,7 +196,9 @@ def read_segment(section: Section) -> Segment:
     else:
         section.take("range")
     name = section.text("name")
-    segment = Segment(name=name, joint=section.text("joint", name), joint_range=joint_range, **values)
+    joint = section.text("joint", name)
+    tissue = tuple(read_law(one, "tissue", code) for one in section.sections("tissue", required=False))
+    segment = Segment(name=name, joint=joint, joint_range=joint_range, tissue=tissue, **values)
     section.finish()
     return segment
 

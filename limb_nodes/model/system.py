@@ -126,6 +126,11 @@ def muscle_equations(laws: Mapping[str, Law]) -> System:
     return assemble(muscle.EQUATIONS, MUSCLE_PARAMETERS, MUSCLE_INPUTS, laws)
 
 
+def tissue_system(law: Law) -> System:
+    """The equations of one law of a joint's tissue. Raises ValueError as `System.checked`."""
+    return assemble((), (), ("joint_angle", "joint_velocity"), {"tissue": law}).checked()
+
+
 def assemble(
     level: Iterable[Equation], parameters: Iterable[str], inputs: tuple[str, ...], laws: Mapping[str, Law]
 ) -> System:

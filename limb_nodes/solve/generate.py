@@ -19,13 +19,13 @@ from limb_nodes.levels.tangent import (
     helper_functions,
     tangent_source,
 )
-from limb_nodes.model.kinds import MuscleKind, UnitKind
+from limb_nodes.model.kinds import MuscleKind, TissueKind, UnitKind
 from limb_nodes.model.layout import Layout
 from limb_nodes.model.system import BoundEquation
 from limb_nodes.solve.data import data_type
 from limb_nodes.solve.outputs import LENGTHS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
 
-# The arguments of all functions that are generated, one of each for every kind of muscle or motor unit.
+# The arguments of all functions that are generated, one of each for every kind of muscle, motor unit or tissue.
 # own: the record of the muscle, the group or (drive, observe) the motor unit; of the muscle in the functions `units_`,
 #   which run over its groups. group: the record of the unit's group.
 # fibre_length, activation, ...: numbers (SI), and with d_ in front their tangents.
@@ -45,6 +45,8 @@ ARGUMENTS = {
     "muscle": "own, joint_angle, joint_velocity, internal, rates, model, data",
     "muscle_t": "own, joint_angle, d_joint_angle, joint_velocity, d_joint_velocity, internal, model, data",
     "muscle_lengths": "own, joint_angle, joint_velocity, internal, model, out",
+    "tissue": "own, joint_angle, joint_velocity, model",
+    "tissue_t": "own, joint_angle, d_joint_angle, joint_velocity, d_joint_velocity, model",
     "muscle_observe": "own, joint_angle, joint_velocity, excitation, internal, model, data, out",
 }
 
@@ -543,9 +545,21 @@ def muscle_tangent(equations: Equations, number: int, kind: MuscleKind, units: S
     return body.function("muscle_t", number)
 
 
+def tissue_function(equations: Equations, number: int, kind: TissueKind, tangent: bool) -> str:
+    """The moment of a tissue, or its derivative in a direction."""
+    body = Body(equations, ("joint_angle", "joint_velocity") if tangent else ())
+    stage = kind.stages["loop"]
+    body.load(kind.columns, used_by(stage), "model.parameters", "own.parameters")
+    body.compute(stage)
+    body.add(f"return {body.slope('passive_moment') if tangent else 'passive_moment'}")
+    return body.function("tissue_t" if tangent else "tissue", number)
+
+
 def dispatcher(name: str, kinds: int) -> str:
     """A function that calls the function `name` of the kind of its first argument."""
-    result = {"muscle": "0.0", "muscle_drive": "0.0", "muscle_t": "0.0, 0.0"}.get(name, "0")
+    result = {"muscle": "0.0", "muscle_drive": "0.0", "muscle_t": "0.0, 0.0", "tissue": "0.0", "tissue_t": "0.0"}.get(
+        name, "0"
+    )
     lines = by_kind("own", {number: [f"return {call(name, number)}"] for number in range(kinds)}, "    ", kinds)
     return "\n".join([f"@forced\ndef {name}({ARGUMENTS[name]}):", *lines, f"    return {result}\n"])
 
@@ -574,6 +588,10 @@ def program(layout: Layout, imports: str, entries: str) -> str:
         texts += group_loops(layout.unit_kinds, looped)
     for number, muscle_kind in enumerate(layout.muscle_kinds):
         texts += muscle_functions(equations, number, muscle_kind, layout.unit_kinds)
+    for number, tissue_kind in enumerate(layout.tissue_kinds):
+        texts += [tissue_function(equations, number, tissue_kind, tangent) for tangent in (False, True)]
+    for name in ("tissue", "tissue_t"):
+        texts.append(dispatcher(name, len(layout.tissue_kinds)))
     for name in ("muscle", "muscle_t", "muscle_lengths", "muscle_observe", "muscle_drive"):
         texts.append(dispatcher(name, len(layout.muscle_kinds)))
     for name in ("unit_drive", "unit_observe"):
@@ -582,6 +600,7 @@ def program(layout: Layout, imports: str, entries: str) -> str:
         "JOINTS": layout.joints,
         "MUSCLES": layout.muscles,
         "UNITS": layout.units,
+        "TISSUES": layout.tissues,
         "STATES": layout.states,
         "DRIVES": layout.drives,
         "LENGTHS": len(LENGTHS),

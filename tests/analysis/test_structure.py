@@ -193,7 +193,13 @@ def test_blocks_come_in_an_order_in_which_they_can_be_solved():
 
 
 @pytest.mark.parametrize(
-    ("process", "name"), [(process, name) for process, laws in REGISTRY.items() for name in laws if ":" not in name]
+    ("process", "name"),
+    [
+        (process, name)
+        for process, laws in REGISTRY.items()
+        for name in laws
+        if ":" not in name and CONTRACTS[process].owner != "joint"
+    ],
 )
 def test_every_law_keeps_the_model_determined_with_index_one(process, name):
     limb = with_law(limb_of("reference_joint_tendon"), process, REGISTRY[process][name], {})

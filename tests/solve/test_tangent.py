@@ -9,7 +9,7 @@ import pytest
 from limb_nodes.levels import CONTRACTS, REGISTRY, motor_unit, muscle, sarcomere
 from limb_nodes.levels.tangent import UnsupportedCode, tangent_source
 from limb_nodes.model import load_limb, with_values
-from limb_nodes.model.system import muscle_system, unit_system
+from limb_nodes.model.system import muscle_system, tissue_system, unit_system
 from limb_nodes.solve.whole import WholeModel
 
 PARAMS = Path(__file__).parents[2] / "params"
@@ -97,6 +97,12 @@ NUMBERS = {
     "path__distal_distance": 0.03,
     "tendon__slack_length": 0.03,
     "tendon__maximum_force": 100.0,
+    "tissue__stiffness": 30.0,
+    "tissue__stop_angle": 0.1,
+    "tissue__upper_angle": 1.0,
+    "tissue__upper_growth": 4.0,
+    "tissue__lower_angle": -0.5,
+    "tissue__lower_growth": 3.0,
     "aponeurosis__slack_length": 0.06,
     "aponeurosis__stiffness": 1e6,
     "aponeurosis__area": 1.2e-3,
@@ -108,6 +114,8 @@ NUMBERS = {
 def system_around(law):
     """The system of a unit or muscle that has this law and, for the rest, the defaults."""
     owner = CONTRACTS[law.process].owner
+    if owner == "joint":
+        return tissue_system(law), {law.process: law}
     laws = {
         process: REGISTRY[process][contract.absent or contract.default]
         for process, contract in CONTRACTS.items()
