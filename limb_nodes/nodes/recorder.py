@@ -51,8 +51,8 @@ FLUSHED = RECORDER_LAG // 4
 PATIENCE = 5.0
 # How long to wait for a node's answer before it is asked again (s).
 ASK_AGAIN = 1.0
-# The run has no more messages if none has come for so long after its end (s).
-SETTLED = 0.5
+# A run that another one follows has no more messages if none has come for so long (s).
+SETTLED = 0.2
 
 
 class Recorder(LimbNode):
@@ -225,15 +225,15 @@ class Recorder(LimbNode):
         come = {
             topic: list(taken(subscription)) for topic, subscription in (*self.ticked.items(), *self.others.items())
         }
-        if any(come[topic] for topic in RECORDED):
-            self.last_message = time.monotonic()
-            self.first_message = self.first_message or self.last_message
+        if self.first_message is None and any(come[topic] for topic in RECORDED):
+            self.first_message = time.monotonic()
         if self.writer is None:
             for topic, messages in come.items():
                 self.early[topic] += messages
             return
         for topic in self.ticked:
             if messages := self.part.drain(topic, [*self.early.pop(topic, ()), *come[topic]]):
+                self.last_message = time.monotonic()
                 self.writer.write_many(topic, messages, TOPIC_TYPES[topic])
                 if topic == "movement_pattern":
                     states = self.part.joint_states(messages)

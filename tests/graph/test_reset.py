@@ -15,19 +15,16 @@ NODES = ("activation_input", "muscle_stack", "limb_dynamics", "recorder")
 RESETS = 3
 
 
-@pytest.fixture
-def started(limb, waves, processes, tmp_path):
-    """The nodes of a run that is longer than the test, by name."""
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_all_nodes_begin_the_run_anew_and_the_recorder_another_bag(mode, limb, waves, processes, bags, bench, tmp_path):
+    graph = bench()
     given = {
         "activation_input": {"source": waves, "duration": 3600.0},
         "limb_dynamics": {"await_recorder": True},
         "recorder": {"out": tmp_path / "run"},
     }
-    return {name: processes.node(name, limb=limb, rate=1000.0, **given.get(name, {})) for name in NODES}
-
-
-def test_all_nodes_begin_the_run_anew_and_the_recorder_another_bag(started, bags, bench, tmp_path):
-    graph = bench()
+    common = {"limb": limb, "rate": 200.0, "mode": mode}
+    started = {name: processes.node(name, **common, **given.get(name, {})) for name in NODES}
     heard = graph.listen(MovementPattern, "movement_pattern", LIVE)
     reset = graph.probe.create_client(Trigger, "reset")
     runs: list[str] = []
@@ -45,14 +42,16 @@ def test_all_nodes_begin_the_run_anew_and_the_recorder_another_bag(started, bags
     assert all(child.running() for child in started.values())
     for name in "limb_dynamics", "recorder", "muscle_stack", "activation_input":
         started[name].signal(signal.SIGTERM)
-        assert (started[name].wait(), started[name].said) == (0, "")
+        assert started[name].wait() == 0, started[name].said
+        # In real time a busy machine misses deadlines, and says so.
+        assert mode == "realtime" or started[name].said == ""
     folders = [tmp_path / "run", *(tmp_path / f"run_reset{number + 1}" for number in range(RESETS))]
     tables = [bags.decoded(folder, ("movement_pattern",))["movement_pattern"] for folder in folders]
     assert [str(table["run"]) for table in tables] == runs
     least = min(len(table["tick"]) for table in tables)
     for table in tables:
         assert table["tick"].tolist() == list(range(len(table["tick"])))
-        assert (table["angle"][:least] == tables[0]["angle"][:least]).all()
+        assert mode == "realtime" or (table["angle"][:least] == tables[0]["angle"][:least]).all()
     assert least > 101
 
 
