@@ -9,6 +9,8 @@ from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.curve_checks import curve_fault, grid, point_text
 from limb_nodes.model.probe import Probe, given, initial_states, states_fault
 
+# By how much a joint is turned at least to tell a length's slope (rad).
+LEAST_TURN = 1e-6
 FORCES = [0.0, 1.0, 10.0, 100.0, 1000.0]
 
 
@@ -25,7 +27,8 @@ def path_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
         fault = curve_fault(name, variable, angles, [point[name] for point in points], least=least)
         if fault:
             return fault
-    small = 1e-5 * (high - low)
+    # Over less, rounding of the lengths would tell more than their slope.
+    small = max(1e-5 * (high - low), LEAST_TURN)
     for angle, point in zip(angles, points, strict=True):
         before, after = (
             probe.at(joint_angle=angle + step, joint_velocity=1.0)["muscle_tendon_length"] for step in (-small, small)

@@ -1,5 +1,7 @@
 """Joint ranges of a limb with muscles, and solves that cannot go on."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,9 +9,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from limb_nodes.model import parse_limb
 from limb_nodes.solve.failure import SolveError
 from limb_nodes.solve.limits import crossing
 from limb_nodes.solve.pieces import pieces
+from limb_nodes.solve.whole import WholeModel
 
 RATE = 1000.0
 
@@ -139,3 +143,16 @@ def test_a_load_beyond_all_measure_ends_the_solve(model_named):
     model = model_named("reference_joint", {"tip_force": [1e300, 1e300]})
     with pytest.raises(SolveError, match="the solution stops at"):
         model.simulate(np.zeros((11, 2)), RATE, method="explicit")
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_a_joint_may_have_hardly_any_room(width):
+    """A fixation: the movement stays within the range, and the limb is solved in few steps."""
+    text = Path("params/seated_knee.yaml").read_text()
+    assert "range: [0.0, 1.75]" in text
+    limb = parse_limb(text.replace("range: [0.0, 1.75]", f"range: [1.5708, {1.5708 + width:.12f}]"), "knee.yaml")
+    pulled = 0.3 + 0.3 * np.sin(np.arange(401) / 30.0)
+    found = WholeModel(limb).simulate(np.stack([pulled, pulled, 0.6 - pulled, 0.6 - pulled], axis=1), 200.0)
+    assert found.angle.min() >= 1.5708 - 1e-12
+    assert 0.1 * width < np.ptp(found.angle) <= width + 1e-12
+    assert sum(found.steps) < 3000
