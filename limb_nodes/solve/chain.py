@@ -24,9 +24,9 @@ OPTIONS = {"error_model": "numpy", "cache": True, "forceinline": True}
 FORCE_X, FORCE_Y, TIP_TORQUE = 0, 1, 2
 # What an impulse may miss, of the sum of its parts.
 ROUNDING = 1e-13
-# A joint that would leave its limit more slowly (rad/s) stays: two that throw each other off in turn, ever more slowly,
-# would do so without end.
-REST = 1e-7
+# A joint that would leave its limit and be back before it is so far away (rad) stays: two that throw each other off in
+# turn, ever more slowly, would do so without end.
+BOUNCE = 1e-11
 # Rows of the numbers between the stages of an evaluation: torque of motion, gravity and load about each joint (N m);
 # cosine and sine of each segment's absolute angle, and its speed (rad/s); then n rows of the inertia matrix of the
 # joints (kg m^2), which its Cholesky factor replaces.
@@ -153,10 +153,11 @@ def momentum_of(joint, velocity, scratch):
 
 
 @njit(**OPTIONS)
-def wrong_stop(y, locked, side, after, scratch):
+def wrong_stop(y, locked, side, pressed, after, scratch):
     """The first joint on its limit that is held though its limit would have to pull, or flies through it; -1 if none.
 
-    Needs the inertia matrix in scratch.
+    pressed: by how much each is accelerated towards its limit (rad/s^2), 0 or more. Needs the inertia matrix in
+    scratch.
     """
     n = scratch.shape[1]
     for k in range(n):
@@ -171,28 +172,39 @@ def wrong_stop(y, locked, side, after, scratch):
             part = scratch[INERTIA + k, other] * (after[other] - y[n + other])
             pull += part
             size += abs(part)
-        if side[k] * pull > ROUNDING * size + REST * scratch[INERTIA + k, k]:
+        slow = math.sqrt(2.0 * BOUNCE * pressed[k])
+        if side[k] * pull > ROUNDING * size + slow * scratch[INERTIA + k, k]:
             return k
     return -1
 
 
 @njit(**OPTIONS)
-def impact(world, segments, load, y, locked, work, scratch):
+def press(world, segments, load, y, torque, locked, pressed, work, scratch):
+    """By how much each joint would be accelerated towards its limit, were it free: pressed [n] (rad/s^2), 0 or more."""
+    acceleration(world, segments, load, y, torque, locked, pressed, scratch)
+    reaction(world, segments, load, y, torque, pressed, work, scratch)
+    for k in range(scratch.shape[1]):
+        pressed[k] = max(0.0, -locked[k] * work[k] / scratch[INERTIA + k, k])
+
+
+@njit(**OPTIONS)
+def impact(world, segments, load, y, torque, locked, pressed, work, scratch):
     """The velocities in y become those after the impulses of the limits, on which the locked joints are.
 
     A limit only pushes: a joint that it would have to hold flies off, and is locked no more. That is a linear
     complementarity problem, impulse against velocity, whose matrix is positive definite; Murty's pivots, of the first
     joint that is wrong each time, end with its one solution (Mathematical Programming 7 (1974) 138).
-    work: [2 n or more].
+    pressed: [n], is overwritten. work: [2 n or more].
     """
     n = scratch.shape[1]
+    press(world, segments, load, y, torque, locked, pressed, work, scratch)
     after, side = work[:n], work[n:]
     for k in range(n):
         side[k] = locked[k]
     for _ in range(2**n + 1):
         stop(world, segments, load, y, locked, after, scratch)
         joint_equations(world, segments, load, y, scratch)
-        wrong = wrong_stop(y, locked, side, after, scratch)
+        wrong = wrong_stop(y, locked, side, pressed, after, scratch)
         if wrong < 0:
             break
         locked[wrong] = side[wrong] if locked[wrong] == 0.0 else 0.0

@@ -232,6 +232,7 @@ def settle(t, method_, work_, problem_):
     lock_touching(t, work, problem, limits, locked)
     for j in range(problem.joints):
         if locked[j] != 0.0 and work[STATE, problem.joints + j] != 0.0:
+            evaluate(problem.rates, t, work[STATE], problem, work[START_RATES])
             evaluate(problem.strike, t, work[STATE], problem, work[START_RATES])
             break
 
@@ -281,4 +282,5 @@ def take_effect(t, method_, work_, control_, problem_):
         control.quiet_until = t + LEAST_FLIGHT
         return
     locked[joint], state[joint] = crossed(state, limits, problem.joints, joint)
+    evaluate(problem.rates, t, state, problem, work[STAGE_STATE])
     evaluate(problem.strike, t, state, problem, work[STAGE_STATE])

@@ -166,6 +166,13 @@ def test_trajectory_of_five_segments_is_that_of_mujoco(five):
         np.testing.assert_allclose(found.velocity[row], other.data.qvel, atol=1e-5)
 
 
+def strike(limb, y: np.ndarray, locked: np.ndarray) -> None:
+    """An impact without muscles and load."""
+    n = locked.size
+    given = np.zeros(3), y, np.zeros(n), locked, np.empty(n), np.empty(2 * n), np.zeros((chain.INERTIA + n, n))
+    chain.impact(world_of(limb), segments_of(limb), *given)
+
+
 def after_impact(matrix, velocity, side) -> tuple[np.ndarray, list[bool]]:
     """Velocities and stopped joints, of all ways to stop some on a limit the one in which limits only push."""
     on = [joint for joint, flag in enumerate(side) if flag]
@@ -194,8 +201,7 @@ def test_limits_only_push_in_an_impact(n, seed, data):
     matrix = other.matrix()
     expected, stopped = after_impact(matrix, velocity, side)
     y, locked = np.append(angle, velocity), side.copy()
-    scratch = np.zeros((chain.INERTIA + n, n))
-    chain.impact(world_of(limb), segments_of(limb), np.zeros(3), y, locked, np.empty(2 * n), scratch)
+    strike(limb, y, locked)
     np.testing.assert_allclose(y[n:], expected, rtol=1e-8, atol=1e-9)
     # Locked are those that have been stopped.
     np.testing.assert_array_equal(locked != 0.0, stopped)
@@ -215,13 +221,12 @@ def test_a_resting_joint_is_thrown_off_its_limit():
     matrix.set(np.zeros(2), np.zeros(2))
     inertia = matrix.matrix()
     y, locked = np.array([0.0, 0.0, 0.0, -3.0]), np.array([1.0, -1.0])
-    world, segments = world_of(limb), segments_of(limb)
-    chain.impact(world, segments, np.zeros(3), y, locked, np.empty(4), np.zeros((chain.INERTIA + 2, 2)))
+    strike(limb, y, locked)
     assert locked.tolist() == [0.0, -1.0]
     assert y[2:] == pytest.approx([-3.0 * inertia[0, 1] / inertia[0, 0], 0.0])
     # At its lowest angle the limit would push.
     y, locked = np.array([0.0, 0.0, 0.0, -3.0]), np.array([-1.0, -1.0])
-    chain.impact(world, segments, np.zeros(3), y, locked, np.empty(4), np.zeros((chain.INERTIA + 2, 2)))
+    strike(limb, y, locked)
     assert (locked.tolist(), y[2:].tolist()) == ([-1.0, -1.0], [0.0, 0.0])
 
 
