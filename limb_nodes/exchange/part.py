@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from limb_nodes.errors import UserError
@@ -34,6 +34,7 @@ class Part:
         self.outgoing: dict[str, Outgoing] = {}
         self.streams: dict[str, Stream] = {}
         self._handlers: dict[str, Callable[[int, bytes], None]] = {}
+        self._former: set[bytes] = set()
         self.finished = False
         self.bad_input = self.foreign = self.conflicts = 0
         self.complain: Complain = lambda what: None
@@ -45,6 +46,10 @@ class Part:
         self.identity, self._own = identity, bytes_of(identity)
         for messages in self.outgoing.values():
             messages.identify(self._own)
+
+    def knows(self, former: Iterable[str]) -> None:
+        """Of these runs, which came before, last messages may still come; they are neither taken nor counted."""
+        self._former = {bytes_of(identity) for identity in former}
 
     def sends(self, topic: str) -> Outgoing:
         """The messages that the part sends on a topic."""
@@ -80,6 +85,8 @@ class Part:
         if identity and not self.identity:
             self.join(identity)
             return True
+        if given in self._former:
+            return False
         self.foreign += 1
         if not identity:
             # Of another run it is enough to know how many: that run is told to give way.

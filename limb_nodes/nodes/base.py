@@ -62,14 +62,16 @@ class LimbNode(Node):
     """A node of one limb at one rate.
 
     part: what it does in a run. failure: why it cannot go on, and the exit status, for whoever spins it; a text,
-    because an error would keep the node and all that it knows alive. following: the identity of the run that is to
-    begin in place of this one, once it is known.
+    because an error would keep the node and all that it knows alive. former: the identities of the runs in whose place
+    this one began, the last one last. following: that of the run that is to begin in place of this one, once it is
+    known.
     """
 
     part: Part
 
-    def __init__(self, name: str, **options: Any) -> None:
+    def __init__(self, name: str, former: Sequence[str] = (), **options: Any) -> None:
         super().__init__(name, **options)
+        self.former = former
         self.failure: tuple[str, type[UserError]] | None = None
         self.following = ""
         self._last_complaint = -math.inf
@@ -117,6 +119,7 @@ class LimbNode(Node):
             take_priority(self.get_name(), self.priority)
         self.part = part
         part.complain = self.complain
+        part.knows(self.former)
         if self.resume:
             part.take_up(self.recorded_run().past())
         for topic, messages in part.outgoing.items():

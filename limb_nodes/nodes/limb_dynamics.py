@@ -82,7 +82,7 @@ class LimbDynamics(LimbNode):
         self.description = self.create_publisher(String, "robot_description", LATCHED)
         self.description.publish(String(data=urdf(self.limb)))
         self.claims = self.create_publisher(Claim, exchanged("claim"), LATCHED)
-        self.claim = new_claim(part.identity, self.limb, self.ticks, self.mode)
+        self.claim = self.new_claim(part.identity, "".join(self.former[-1:]))
         self.claims.publish(self.claim)
         if frames is not None:
             self.show(lambda: frames(transforms=self.transforms()), self.create_publisher(frames, "/tf", LIVE))
@@ -105,7 +105,7 @@ class LimbDynamics(LimbNode):
 
     def on_claim(self, claim: Claim) -> None:
         """Give way to a run that claimed before; tell one that did not again whose the namespace is."""
-        if claim.run == self.part.identity:
+        if claim.run in (self.part.identity, self.following):
             return
         if comes_before(claim, self.claim):
             raise UserError(
@@ -120,11 +120,18 @@ class LimbDynamics(LimbNode):
 
     def on_reset(self, _: Trigger.Request, answer: Trigger.Response) -> Trigger.Response:
         """Let all nodes of the run know the identity of the one that follows."""
+        if self.part.tick <= 0:
+            answer.message = f"the run {self.part.identity} has not made its first tick; there is nothing to begin anew"
+            return answer
         if not self.following:
             self.following = new_identity()
-            self.claims.publish(new_claim(self.following, self.limb, self.ticks, self.mode, self.part.identity))
+            self.claims.publish(self.new_claim(self.following, self.part.identity))
         answer.success, answer.message = True, f"the run {self.following} begins"
         return answer
+
+    def new_claim(self, identity: str, replaces: str) -> Claim:
+        """A claim of the namespace for a run, made now; replaces: the run in whose place it begins."""
+        return new_claim(identity, self.limb, self.ticks, self.mode, replaces)
 
     def on_progress(self, message: Recorded) -> None:
         """The recorder has every tick up to this one; -1 when it is ready."""

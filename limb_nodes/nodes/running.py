@@ -32,6 +32,8 @@ from limb_nodes.nodes.distribution import make_executor
 SPIN_TIMEOUT = 0.05
 # The signals by which a run is ended in order; the last comes when a terminal is closed.
 ENDING = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+# So many runs before the present one, whose last messages may still be on their way, are known.
+FORMER = 8
 # Ports are numbered by the domain; there are none beyond.
 HIGHEST_DOMAIN = 232
 
@@ -85,25 +87,28 @@ def run_node(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
 def run_guarded(node_class: Callable[..., Any], args: Sequence[str] | None) -> int:
     """The same; raises UserError and whatever else goes wrong."""
     interrupt = Interrupt()
-    context = Context()
-    try:
-        init_ros(context, args)
-        given: dict[str, Any] = {}
-        while given := run_once(node_class, context, given, interrupt):
-            pass
-        return 0
-    finally:
-        close(context, None, [])
+    given: dict[str, Any] = {}
+    former: tuple[str, ...] = ()
+    while True:
+        # A run has a context of its own: what the middleware has kept for the one before cannot hold it up.
+        context = Context()
+        try:
+            init_ros(context, args)
+            node = node_class(
+                context=context,
+                parameter_overrides=[Parameter(key, value=given[key]) for key in given],
+                former=former[-FORMER:],
+            )
+            given = run_once(node, context, interrupt)
+        finally:
+            close(context, None, [])
+        if not given:
+            return 0
+        former = (*former, node.part.identity)
 
 
-def run_once(
-    node_class: Callable[..., Any], context: Context, given: dict[str, Any], interrupt: Interrupt
-) -> dict[str, Any]:
-    """Run one node for one run; the parameters with which it begins the run that follows, none if there is no such.
-
-    given: parameters that are others than those of the command line.
-    """
-    node = node_class(context=context, parameter_overrides=[Parameter(key, value=given[key]) for key in given])
+def run_once(node: Any, context: Context, interrupt: Interrupt) -> dict[str, Any]:
+    """Run one node for one run; the parameters with which it begins the run that follows, none if there is no such."""
     executor = make_executor(context)
     try:
         executor.add_node(node)
@@ -118,7 +123,8 @@ def run_once(
         stays = bool(os.environ.get(STAY))
         spin(executor, lambda: interrupt.wanted or (node.finished and not stays) or bool(node.failure) or orphaned())
         node.raise_failure()
-        if not interrupt.wanted:
+        # Whoever begins another run hears of it from limb_dynamics there, too.
+        if not (interrupt.wanted or node.following):
             linger(executor, node, interrupt)
         return {} if interrupt.wanted or parent or not node.following else node.parameters_of_following()
     finally:
