@@ -25,6 +25,7 @@ from typing import Any
 from limb_nodes import cli, commands
 from limb_nodes.levels import CONTRACTS, REGISTRY, Law, Parameter, motor_unit, sarcomere
 from limb_nodes.model import load
+from limb_nodes.model.spanning import READERS
 from limb_nodes.signals.waveform import WAVES
 
 DOCS = Path(__file__).resolve().parent
@@ -136,6 +137,8 @@ def process_table() -> str:
     for contract in CONTRACTS.values():
         place = contract.section.replace("_", " ")
         laws = ", ".join(f"[`{name}`](laws.md#{anchor(contract.process, name)})" for name in REGISTRY[contract.process])
+        if contract.process == "path":
+            laws += ", " + ", ".join(f"[`{name}`](#paths-over-several-joints)" for name in READERS)
         absent = "none" if contract.owner == "joint" else f"`{contract.absent or contract.default}`"
         rows.append((f"`{contract.process}`", place, contract.meaning, laws, absent))
     return table(("key", "of a", "gives", "laws", "without the key"), rows)

@@ -10,10 +10,8 @@ import numpy as np
 from limb_nodes.bags.read import BagReader
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.limb import Limb
-from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, UNIT_FIELDS
+from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, STATE_FIELDS, UNIT_FIELDS
 from limb_nodes.solve.whole import Movement
-
-STATES = {"muscle_state": MUSCLE_FIELDS, "motor_unit_state": UNIT_FIELDS, "sarcomere_state": SARCOMERE_FIELDS}
 
 
 @dataclass(frozen=True)
@@ -39,8 +37,8 @@ class Trajectory:
 def trajectory_of_movement(limb: Limb, movement: Movement) -> Trajectory:
     """The trajectory of a movement that was solved with its outputs."""
     torque = np.zeros_like(movement.angle)
-    for index, muscle in enumerate(limb.muscles):
-        torque[:, muscle.joint] += movement.muscle["muscle_torque"][:, index]
+    for crossing, (_, joint) in enumerate(limb.crossings):
+        torque[:, joint] += movement.muscle["muscle_torque"][:, crossing]
     return Trajectory(
         time=movement.time,
         angle=movement.angle,
@@ -58,8 +56,8 @@ def trajectory_of_bag(path: str | Path) -> Trajectory:
     """The trajectory that the bag of a run holds, states at every tick or not at all. Raises UserError."""
     with BagReader(path) as bag:
         pattern = bag.table("movement_pattern")
-        states: dict[str, dict[str, FloatArray]] = {topic: {} for topic in STATES}
-        for topic, fields in STATES.items():
+        states: dict[str, dict[str, FloatArray]] = {topic: {} for topic in STATE_FIELDS}
+        for topic, fields in STATE_FIELDS.items():
             if bag.has(topic):
                 table = bag.table(topic)
                 states[topic] = {key: table[key] for key in fields}

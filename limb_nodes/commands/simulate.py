@@ -7,7 +7,7 @@ import math
 import shlex
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from limb_nodes.foundation.text_table import aligned
 
 if TYPE_CHECKING:
     from limb_nodes.analysis.record import MovementBag
+    from limb_nodes.model import Limb
     from limb_nodes.solve.ranges import Ranges
     from limb_nodes.solve.whole import Movement
 
@@ -80,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
             "seed": None,
         }
         bag = MovementBag(args.out, limb, len(activation), args.rate, info, ranges)
-    summary, failure = Summary(limb.joint_names, ranges), None
+    summary, failure = Summary(limb, ranges), None
     try:
         with bag as recording:
             for part in summary.over(
@@ -102,10 +103,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 class Summary:
-    """What is told of a movement: how long it took to solve, where its joints went, what left its range."""
+    """What is told of a movement: how long it took to solve, where its joints went, what does not balance or fit."""
 
-    def __init__(self, joints: Sequence[str], ranges: Ranges) -> None:
-        self._joints, self._ranges = joints, ranges
+    def __init__(self, limb: Limb, ranges: Ranges) -> None:
+        self._limb, self._joints, self._ranges = limb, limb.joint_names, ranges
+        joints = self._joints
         self._seconds = self._end = 0.0
         self._steps = 0
         self._lowest = [math.inf] * len(joints)
@@ -133,4 +135,7 @@ class Summary:
             rows.append((joint, f"{lowest:.3f}", f"{highest:.3f}", f"{last:.4f}", ""))
         solved = f"solved     {self._end:g} s in {self._seconds:.3g} s, {self._steps} steps"
         left = [f"range      {length} {told}" for length, told in self._ranges.told().items()]
-        return [solved, *aligned(rows, "lrrr"), *left]
+        from limb_nodes.model.path_remarks import unequal_work
+
+        work = [f"work       {told}"] if (told := unequal_work(self._limb)) else []
+        return [solved, *aligned(rows, "lrrr"), *work, *left]

@@ -105,7 +105,8 @@ def forms_of(limb: Limb) -> dict[str, Form]:
         "limb_state": {"joint": joints, **zeros(["angle", "velocity"], len(joints))},
         "joint_torque": {
             "joint": joints,
-            **zeros(["torque", "slope_angle", "slope_velocity", "slope_time"], len(joints)),
+            **zeros(["torque", "slope_time"], len(joints)),
+            **zeros(["slope_angle", "slope_velocity"], len(joints) ** 2),
         },
         "movement_pattern": {
             "joint": joints,
@@ -114,7 +115,13 @@ def forms_of(limb: Limb) -> dict[str, Form]:
             "load": [0.0] * 3,
             "position": [corner] * len(points),
         },
-        "muscle_state": {"name": muscles, **zeros(MUSCLE_FIELDS, len(muscles))},
+        "muscle_state": {
+            "name": muscles,
+            **zeros(MUSCLE_FIELDS, len(muscles)),
+            "torque_muscle": [muscles[muscle] for muscle, _ in limb.crossings],
+            "torque_joint": [joints[joint] for _, joint in limb.crossings],
+            **zeros(["torque"], len(limb.crossings)),
+        },
         "motor_unit_state": {**of_unit, **zeros(UNIT_FIELDS, units)},
         "sarcomere_state": {**of_unit, **zeros(SARCOMERE_FIELDS, units)},
         "muscle_checkpoint": {"state": [0.0] * remembered},

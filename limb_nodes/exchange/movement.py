@@ -16,9 +16,10 @@ from limb_nodes.exchange.past import Past
 from limb_nodes.exchange.stream import CHECKPOINT, RECORDER_LAG
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.points import points
+from limb_nodes.solve.held import slope_rows
+from limb_nodes.solve.outputs import TORQUE_FIELDS
 from limb_nodes.solve.stepping import LimbStepper
 
-TORQUE_FIELDS = ("torque", "slope_angle", "slope_velocity", "slope_time")
 REMEMBERED = 1000
 # How long the limb goes on with a torque in real time (s). Farther its slopes say nothing.
 MOST_AHEAD = 0.05
@@ -150,8 +151,9 @@ class LimbPart(Part):
         return self.awaits_recorder and self.tick - self.recorded > RECORDER_LAG
 
     def rows(self, data: bytes) -> FloatArray:
-        """Torque and slopes [4, n] of a message."""
-        return np.array([self.values("joint_torque", data, name) for name in TORQUE_FIELDS])
+        """Torque and slopes [2 + 2 n, n] of a message."""
+        parts = [self.values("joint_torque", data, name) for name in TORQUE_FIELDS]
+        return np.concatenate(parts).reshape(-1, self.stepper.joints)
 
     def step_to_now(self) -> None:
         """In real time, step as far as the wall clock has gone."""
@@ -203,10 +205,11 @@ class LimbPart(Part):
             return rows
         angle, velocity = self.history[tick]
         carried = rows.copy()
+        by_angle, by_velocity = slope_rows(rows)
         carried[0] += (
-            rows[1] * (self.stepper.angle - angle)
-            + rows[2] * (self.stepper.velocity - velocity)
-            + rows[3] * (self.tick - tick) * self.ticks.period
+            by_angle @ (self.stepper.angle - angle)
+            + by_velocity @ (self.stepper.velocity - velocity)
+            + rows[1] * (self.tick - tick) * self.ticks.period
         )
         return carried
 

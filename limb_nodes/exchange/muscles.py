@@ -15,7 +15,7 @@ from limb_nodes.exchange.past import Past
 from limb_nodes.exchange.stream import CHECKPOINT
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.topics import STATES
-from limb_nodes.solve.outputs import MUSCLE_FIELDS, MUSCLE_OUTPUTS, SARCOMERE_FIELDS, UNIT_FIELDS, UNIT_OUTPUTS
+from limb_nodes.solve.outputs import STATE_FIELDS, TORQUE_FIELDS
 from limb_nodes.solve.small import finite
 from limb_nodes.solve.stepping import MuscleStepper
 
@@ -50,14 +50,8 @@ class MusclePart(Part):
 
     def copied(self, topic: str) -> tuple[Outgoing, list[tuple[FloatArray, FloatArray]]]:
         """The messages of a topic of states, and pairs of target and source to copy into them."""
-        muscles, units = self.stepper.shown
-        fields, outputs, shown = {
-            "muscle_state": (MUSCLE_FIELDS, MUSCLE_OUTPUTS, muscles),
-            "motor_unit_state": (UNIT_FIELDS, UNIT_OUTPUTS, units),
-            "sarcomere_state": (SARCOMERE_FIELDS, UNIT_OUTPUTS, units),
-        }[topic]
-        messages = self.sends(topic)
-        return messages, [(messages.values[field], shown[:, outputs.index(name)]) for field, name in fields.items()]
+        shown, messages = self.stepper.shown, self.sends(topic)
+        return messages, [(messages.values[field], shown[name]) for field, name in STATE_FIELDS[topic].items()]
 
     def on_activation(self, tick: int, data: bytes) -> None:
         """Keep the activation of a tick, and answer if it was waited for."""
@@ -97,14 +91,18 @@ class MusclePart(Part):
         excitation, drive = self.advance(tick, angle, velocity)
         next_drive = drive if following is None else following[1]
         rows = self.stepper.torque(angle, velocity, drive, next_drive, self.ticks.period, self.last_drive)
-        if not finite(rows.reshape(-1)):
+        numbers = rows.reshape(-1)
+        if not finite(numbers):
             why = self.stepper.fault() or "a slope of the torque is not a finite number"
             raise RunError(f"{self.limb.file}: stops at {tick * self.ticks.period:g} s, tick {tick}: {why}")
         if self.stepper.look() or tick == self.last_tick:
             self.tell_ranges()
         values = self.torque.values
-        values["torque"][:], values["slope_angle"][:] = rows[0], rows[1]
-        values["slope_velocity"][:], values["slope_time"][:] = rows[2], rows[3]
+        start = 0
+        for name in TORQUE_FIELDS:
+            count = values[name].size
+            values[name][:] = numbers[start : start + count]
+            start += count
         values["last_tick"][...] = self.last_tick
         self.torque.publish(tick)
         # The limb waits for the torque; the states are for those who look on.

@@ -33,6 +33,7 @@ class Contract:
     level: the level of the report that holds the equations: "sarcomere", "motor_unit", "muscle", or its sub-level
         "tendon". A law of the last two is chosen in a muscle's section of a limb's file.
     default: the law of a section that names none. absent: the law if there is no section.
+    follows: what need not be defined, for it follows from the rest (`levels.muscle.spanning_path`).
     """
 
     process: str
@@ -44,6 +45,7 @@ class Contract:
     default: str
     properties: tuple[str, ...] = ()
     absent: str = ""
+    follows: tuple[str, ...] = ()
 
     @property
     def section(self) -> str:
@@ -142,6 +144,7 @@ CONTRACTS: dict[str, Contract] = {
             ("muscle_tendon_length", "muscle_tendon_velocity", "moment_arm"),
             "constant_moment_arm",
             ("the velocity is the rate at which the length shortens", "the length is positive"),
+            follows=("muscle_tendon_velocity", "moment_arm"),
         ),
         Contract(
             "tendon",
@@ -214,17 +217,19 @@ def law(
     """Make a law of one equation from a function.
 
     The function's arguments are variables that the contract of `process` gives, or `parameters`;
-    its value is the variable that the contract asks for. Raises TypeError if the contract asks for
-    more than one variable: such a law is built with `Law`.
+    its value is the variable that the contract asks for. Of a path that is the length; its arguments may be the angles
+    of several joints, such as knee_angle. Raises TypeError if the contract asks for more than one variable: such a law
+    is built with `Law`.
     """
     contract = CONTRACTS[process]
-    if len(contract.defines) != 1:
+    owed = [name for name in contract.defines if name not in contract.follows]
+    if len(owed) != 1:
         raise TypeError(f"a law of {process} defines {', '.join(contract.defines)}: build it with Law(...)")
 
     def build(function: ScalarFunction) -> Law:
         marked = function.__dict__.get("equation")
         number = marked.number if isinstance(marked, Equation) else function.__name__
-        item = Equation(number, contract.defines[0], function)
+        item = Equation(number, owed[0], function)
         return Law(process, function.__name__, (item,), parameters, states, source)
 
     return build

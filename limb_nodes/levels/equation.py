@@ -25,16 +25,23 @@ class Equation:
     number: the equation's number in the report, or a short name if the report has none.
     defines: the variable on the left-hand side.
     function: pure function of floats that returns a float.
+    named: names of what it uses, if they are others than those of its arguments.
     """
 
     number: str
     defines: str
     function: ScalarFunction
+    named: tuple[str, ...] = ()
 
     @cached_property
+    def arguments(self) -> tuple[str, ...]:
+        """Names of the function's arguments."""
+        return tuple(inspect.signature(self.function).parameters)
+
+    @property
     def uses(self) -> tuple[str, ...]:
         """Names of the quantities on the right-hand side, in the order of the arguments."""
-        return tuple(inspect.signature(self.function).parameters)
+        return self.named or self.arguments
 
 
 def equation(number: str, defines: str) -> Callable[[ScalarFunction], ScalarFunction]:

@@ -47,7 +47,7 @@ DERIVATIVES = {
 def function_tree(function: ScalarFunction) -> ast.FunctionDef:
     """The syntax tree of a plain function, without decorators, annotations and docstring."""
     try:
-        source = textwrap.dedent(inspect.getsource(function))
+        source = function.__dict__.get("text") or textwrap.dedent(inspect.getsource(function))
     except (OSError, TypeError):
         raise UnsupportedCode(f"{function!r}: its source cannot be read") from None
     tree = ast.parse(source).body[0]
@@ -183,7 +183,7 @@ class Tangent:
     def statement(self, node: ast.stmt, depth: int) -> None:
         if isinstance(node, ast.Return) and node.value is not None:
             value, slope = self.expression(node.value, depth)
-            self.emit(depth, f"return {value}, {slope or '0.0'}")
+            self.emit(depth, f"return {self.returned(value, slope)}")
         elif isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
             self.assign(node.targets[0].id, node.value, depth)
         elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value:
@@ -201,6 +201,10 @@ class Tangent:
             self.emit(depth, "pass")
         elif not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)):
             self.fail(node, f"{type(node).__name__} is not allowed in a law")
+
+    def returned(self, value: str, slope: str) -> str:
+        """What the new function returns."""
+        return f"{value}, {slope or '0.0'}"
 
     def assign(self, target: str, value: ast.expr, depth: int) -> None:
         text, slope = self.expression(value, depth)
@@ -307,15 +311,22 @@ class Tangent:
         target: Any = self.function.__globals__.get(name)
         if not inspect.isfunction(target):
             self.fail(node, f"{name} is not allowed in a law")
-        given, varying = [], set()
+        arguments, given, varying = [], [], set()
         parameters = list(inspect.signature(target).parameters)
         for parameter, argument in zip(parameters, node.args, strict=True):
             value, slope = self.expression(argument, depth)
-            given.append(value)
+            arguments.append(self.keep(value, depth))
+            given.append(arguments[-1])
             if slope:
                 given.append(slope)
                 varying.add(parameter)
-        both = self.keep(f"{self.call_tangent(target, frozenset(varying))}({', '.join(given)})", depth)
+        return self.helper(target, arguments, given, frozenset(varying), depth)
+
+    def helper(
+        self, target: ScalarFunction, arguments: list[str], given: list[str], varying: frozenset[str], depth: int
+    ) -> tuple[str, str]:
+        """A call of another function; given: its arguments and, behind those in `varying`, their tangents."""
+        both = self.keep(f"{self.call_tangent(target, varying)}({', '.join(given)})", depth)
         return f"{both}[0]", f"{both}[1]"
 
     def math_call(self, name: str, node: ast.Call, depth: int) -> tuple[str, str]:
@@ -331,6 +342,8 @@ class Tangent:
         elif name == "pow" and len(kept) == 2 and not kept[1][1]:
             (x, dx), (y, _) = kept
             slope = f"{y} * math.pow({x}, {y} - 1.0) * {dx}"
+        elif name == "copysign" and len(kept) == 2 and not kept[0][1]:
+            return value, "0.0"
         elif name in DERIVATIVES and len(kept) == 1:
             x, dx = kept[0]
             slope = f"({DERIVATIVES[name].format(x=x, y=value)}) * {dx}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.section import Section
@@ -51,12 +52,12 @@ def fibre_length_range(muscle: Muscle, segment: Segment) -> tuple[float, float]:
     return min(lengths), max(lengths)
 
 
-def check_geometry(file: str, muscle: Muscle, segment: Segment) -> None:
-    """Refuse a muscle whose fibres are never between their shortest and longest length."""
+def check_geometry(file: str, muscle: Muscle, segments: Sequence[Segment]) -> None:
+    """Refuse a muscle whose fibres are never between their shortest and longest length. segments: all of the limb."""
     path = muscle.laws["path"].values
     if not {"moment_arm", "proximal_distance", "distal_distance"} <= path.keys():
         return
-    shortest, longest = fibre_length_range(muscle, segment)
+    shortest, longest = fibre_length_range(muscle, segments[muscle.joints[0]])
     if longest <= 0.0:
         slack = muscle.laws["tendon"].values["slack_length"]
         raise UserError(

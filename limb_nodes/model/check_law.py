@@ -10,7 +10,7 @@ import math
 from functools import lru_cache
 
 from limb_nodes.errors import UserError
-from limb_nodes.levels import CONTRACTS, Equation
+from limb_nodes.levels import Equation
 from limb_nodes.levels.sarcomere.lengths import optimal_sarcomere_length
 from limb_nodes.levels.tangent import UnsupportedCode, refuse_unsupported
 from limb_nodes.model.check_muscle_laws import MUSCLE_CHECKS
@@ -19,7 +19,7 @@ from limb_nodes.model.check_unit_laws import UNIT_CHECKS
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle
 from limb_nodes.model.probe import BrokenLaw
-from limb_nodes.model.system import CONSTANTS
+from limb_nodes.model.system import CONSTANTS, crossings_of, given_of, owed_by
 
 # By process.
 CHECKS = {**UNIT_CHECKS, **MUSCLE_CHECKS, **TISSUE_CHECKS}
@@ -62,8 +62,11 @@ def unit_context(unit: MotorUnit) -> dict[str, float]:
 def muscle_context(chosen: ChosenLaw, muscle: Muscle, limb: Limb) -> dict[str, float]:
     """What a law of a muscle is checked with: its joint's range, or its fibres' mean optimal length."""
     if chosen.law.process == "path":
-        low, high = limb.segments[muscle.joint].joint_range or (-math.pi, math.pi)
-        return {"role": muscle.role, "lowest_angle": low, "highest_angle": high}
+        ranges: dict[str, float] = {}
+        for one, joint in zip(crossings_of(chosen.law), muscle.joints, strict=True):
+            low, high = limb.segments[joint].joint_range or (-math.pi, math.pi)
+            ranges |= {f"lowest_angle{one}": low, f"highest_angle{one}": high}
+        return {"role": muscle.role, **ranges}
     if chosen.law.process == "aponeurosis":
         optimal = [
             unit.values["series_sarcomeres"] * optimal_sarcomere_length(unit.laws["sarcomere"].values["actin_length"])
@@ -105,18 +108,18 @@ def fault(same: Same, context: tuple[tuple[str, float], ...]) -> str:
 
 def interface_fault(chosen: ChosenLaw) -> str:
     """What keeps a law from fitting its contract."""
-    law, contract = chosen.law, CONTRACTS[chosen.law.process]
+    law = chosen.law
     states = {state.name for state in law.states}
     defined = {item.defines for item in law.equations} | states
-    for variable in contract.defines:
+    for variable in owed_by(law):
         if variable not in defined:
-            return f"it does not define {variable}, which a law of {contract.process} owes"
-    allowed = {*contract.given, *defined, *chosen.values}
+            return f"it does not define {variable}, which a law of {law.process} owes"
+    given = given_of(law)
+    allowed = {*given, *defined, *chosen.values}
     for item in law.equations:
         for symbol in item.uses:
             if symbol not in allowed:
-                given = ", ".join(contract.given)
-                return f"equation {item.number} uses {symbol}; a law of {contract.process} is given {given}"
+                return f"equation {item.number} uses {symbol}; a law of {law.process} is given {', '.join(given)}"
     for state in law.states:
         if state.rate not in defined:
             return f"it does not define {state.rate}, the rate of its state {state.name}"
@@ -136,7 +139,7 @@ def changing_equations(chosen: ChosenLaw) -> list[Equation]:
     They are compiled; the others, of parameters alone, run once, interpreted.
     """
     law = chosen.law
-    variables = {*CONTRACTS[law.process].given, *(state.name for state in law.states)} - CONSTANTS
+    variables = {*given_of(law), *(state.name for state in law.states)} - CONSTANTS
     waiting = list(law.equations)
     changing: list[Equation] = []
     while True:

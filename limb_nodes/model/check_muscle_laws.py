@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import product
 
 from limb_nodes.model.chosen import ChosenLaw
-from limb_nodes.model.curve_checks import curve_fault, grid, point_text
+from limb_nodes.model.curve_checks import curve_fault, grid, number_text, point_text
 from limb_nodes.model.probe import Probe, given, initial_states, states_fault
+from limb_nodes.model.system import crossings_of
 
 # By how much a joint is turned at least to tell a length's slope (rad).
 LEAST_TURN = 1e-6
+# Corners of the ranges of so many joints are all tried, and so many points between.
+MOST_CORNERS, POINTS_BETWEEN = 8, 200
 FORCES = [0.0, 1.0, 10.0, 100.0, 1000.0]
 
 
 def path_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
     """Length positive, velocity its rate, moment arm finite over the joint's range."""
+    if (crossings := crossings_of(chosen.law)) != ("",):
+        return spanning_fault(chosen, context, crossings)
     variable = "joint_angle"
     probe = Probe(chosen, given(chosen), {"role": context["role"]})
     low, high = chosen.law.ranges.get(variable, (context["lowest_angle"], context["highest_angle"]))
@@ -41,6 +47,36 @@ def path_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:
                 f"but the length shortens by {shortening:.6g} m/s"
             )
     return ""
+
+
+def spanning_fault(chosen: ChosenLaw, context: dict[str, float], crossings: tuple[str, ...]) -> str:
+    """Length positive, moment arms finite wherever the joints of the muscle may be."""
+    probe = Probe(chosen, given(chosen), {"role": context["role"]})
+    still = {f"joint_velocity{one}": 0.0 for one in crossings}
+    ranges = [(context[f"lowest_angle{one}"], context[f"highest_angle{one}"]) for one in crossings]
+    for shares in spread(len(crossings)):
+        angles = {
+            f"joint_angle{one}": low + share * (high - low)
+            for one, (low, high), share in zip(crossings, ranges, shares, strict=True)
+        }
+        point = probe.at(**angles, **still)
+        for name in ("muscle_tendon_length", *(f"moment_arm{one}" for one in crossings)):
+            value = point[name]
+            if not math.isfinite(value) or (name == "muscle_tendon_length" and value <= 0.0):
+                at = " and ".join(f"{angle:.4g}" for angle in angles.values())
+                needed = "a number > 0" if math.isfinite(value) else "a finite number"
+                return f"{name} is {number_text(value)} at the joint angles {at} rad; {needed} is needed"
+    return ""
+
+
+def spread(dimensions: int) -> list[list[float]]:
+    """Points all over a cube of edges from 0 to 1: its corners, if they are not too many, and some between."""
+    # Takes as long to import as many limbs to load.
+    from scipy.stats import qmc
+
+    corners = product((0.0, 1.0), repeat=dimensions) if dimensions <= MOST_CORNERS else ()
+    between = qmc.Halton(dimensions, scramble=False).random(POINTS_BETWEEN)
+    return [*map(list, corners), *between.tolist()]
 
 
 def tendon_fault(chosen: ChosenLaw, context: dict[str, float]) -> str:

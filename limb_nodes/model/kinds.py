@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from limb_nodes.levels import Law
-from limb_nodes.model.system import BoundEquation, System, muscle_system, tissue_system, unit_system
+from limb_nodes.model.system import BoundEquation, System, crossings_of, muscle_system, tissue_system, unit_system
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,11 @@ class MuscleKind:
         return muscle_system(self.laws)
 
     @cached_property
+    def crossings(self) -> tuple[str, ...]:
+        """Endings of the names of variables that there are for each joint that the muscle crosses."""
+        return crossings_of(self.laws["path"])
+
+    @cached_property
     def steady_activation(self) -> bool:
         """Whether the activation follows from the input alone."""
         return self.system.dependence()["activation"] <= {"excitation"}
@@ -142,7 +147,8 @@ class MuscleKind:
         later = [b for n in ("drive", "before", "loop", "after") for b in self.stages[n]]
         used = {symbol for bound in later for symbol in bound.symbols}
         loaded = [bound.defines for bound in self.stages["load"]]
-        outputs = {"tendon_length", "tendon_velocity", "pennation_angle", "moment_arm"}
+        outputs = {"tendon_length", "tendon_velocity", "pennation_angle"}
+        outputs |= {f"moment_arm{one}" for one in self.crossings}
         used |= outputs & set(loaded)
         return [name for name in (*self.system.parameters, *loaded) if name in used]
 

@@ -26,11 +26,13 @@ from limb_nodes.model.system import BoundEquation, System
 Kind = TypeVar("Kind")
 
 # Where a muscle's, a group's and a unit's numbers stand: its kind, and the first of its parameters, internal states,
-# drives and scratch numbers; of a muscle also its joint, its groups (from `group` to before `group_end`), and the end
-# of its states, those of its groups included.
+# drives and scratch numbers; of a muscle also the joints that it crosses (from `crossing` to before `crossing_end`),
+# its groups likewise, and the end of its states, those of its groups included.
 MUSCLE_RECORD = whole_numbers(
-    "kind", "joint", "parameters", "state", "state_end", "drive", "group", "group_end", "scratch"
+    "kind", "crossing", "crossing_end", "parameters", "state", "state_end", "drive", "group", "group_end", "scratch"
 )
+# Of a muscle on one of the joints that it crosses: that joint.
+CROSSING_RECORD = whole_numbers("joint")
 GROUP_RECORD = whole_numbers("kind", "parameters", "state", "drive", "scratch")
 UNIT_RECORD = whole_numbers("kind", "parameters", "group", "muscle")
 # Of a tissue: its kind, its joint and the first of its parameters.
@@ -48,8 +50,8 @@ class Layout:
         world, segments: float64 [3], [4 + n, n], the chain, rows as in `limb_nodes.model.chain`.
         parameters: float64, a row per muscle, group, unit and tissue, SI units; which numbers, its kind tells
             (`columns`).
-        muscles, groups, units, tissues: one record for each, `MUSCLE_RECORD`, `GROUP_RECORD`, `UNIT_RECORD`,
-            `TISSUE_RECORD`.
+        muscles, crossings, groups, units, tissues: one record for each, `MUSCLE_RECORD`, `CROSSING_RECORD`,
+            `GROUP_RECORD`, `UNIT_RECORD`, `TISSUE_RECORD`.
     initial_states: float64 [internal states], initial values of tendons, aponeuroses and laws.
     state_names, state_scales: of the same.
     drives: how many numbers the input becomes (`limb_nodes.solve.whole.WholeModel.drives`).
@@ -76,6 +78,11 @@ class Layout:
     def muscles(self) -> int:
         """Number of muscles."""
         return len(self.model.muscles)
+
+    @property
+    def crossings(self) -> int:
+        """Number of joints that muscles cross, of all muscles together."""
+        return len(self.model.crossings)
 
     @property
     def groups(self) -> int:
@@ -162,6 +169,7 @@ class Packer:
         self.unit_kinds = list(known.unit_kinds) if known else []
         self.tissue_kinds = list(known.tissue_kinds) if known else []
         self.muscles: list[tuple[int, ...]] = []
+        self.crossings: list[tuple[int]] = []
         self.groups: list[tuple[int, ...]] = []
         self.units: list[tuple[int, ...]] = []
         self.tissues: list[tuple[int, ...]] = []
@@ -207,10 +215,13 @@ class Packer:
         group_kinds = self.add_units(number, muscle, kind.steady_activation)
         whole = MuscleKind(laws, group_kinds if len(group_kinds) <= MOST_WRITTEN_OUT else ())
         kind_index, _ = find_or_add(self.muscle_kinds, whole, lambda known: (known.laws, known.groups))
+        crossing = len(self.crossings)
+        self.crossings += [(joint,) for joint in muscle.joints]
         self.muscles.append(
             (
                 kind_index,
-                muscle.joint,
+                crossing,
+                len(self.crossings),
                 parameters,
                 state,
                 len(self.initial),
@@ -257,6 +268,7 @@ class Packer:
                     ("segments", np.float64, segments.shape),
                     ("parameters", np.float64, (len(self.parameters),)),
                     ("muscles", MUSCLE_RECORD, (len(self.muscles),)),
+                    ("crossings", CROSSING_RECORD, (len(self.crossings),)),
                     ("groups", GROUP_RECORD, (len(self.groups),)),
                     ("units", UNIT_RECORD, (len(self.units),)),
                     ("tissues", TISSUE_RECORD, (len(self.tissues),)),
@@ -266,6 +278,7 @@ class Packer:
         model.world[:], model.segments[:] = world, segments
         model.parameters[:] = self.parameters
         model.muscles[:] = self.muscles
+        model.crossings[:] = self.crossings
         model.groups[:] = self.groups
         model.units[:] = self.units
         model.tissues[:] = self.tissues
@@ -322,7 +335,7 @@ def build_layout(limb: Limb, known: Layout | None = None) -> Layout:
 
 def same_structure(one: Layout, other: Layout) -> bool:
     """Whether two limbs have one program and every number at the same place."""
-    records = ("muscles", "groups", "units", "tissues")
+    records = ("muscles", "crossings", "groups", "units", "tissues")
     return (
         one.muscle_kinds == other.muscle_kinds
         and one.unit_kinds == other.unit_kinds

@@ -45,14 +45,15 @@ class MotorUnit:
 
 @dataclass(frozen=True)
 class Muscle:
-    """A muscle over one joint, its units in the order of recruitment.
+    """A muscle over one joint or several, its units in the order of recruitment.
 
-    role: +1 for a flexor (pulls the joint angle up), -1 for an extensor.
+    joints: those that it crosses, from proximal to distal.
+    role: +1 for a flexor (pulls the joint angle up), -1 for an extensor, 0 if the signs of moment arms tell it.
     laws: by process: path, tendon, aponeurosis, activation_dynamics.
     """
 
     name: str
-    joint: int
+    joints: tuple[int, ...]
     role: float
     activation_threshold: float
     laws: dict[str, ChosenLaw]
@@ -89,3 +90,8 @@ class Limb:
     def muscle_names(self) -> list[str]:
         """Names of the muscles in the order of the file."""
         return [muscle.name for muscle in self.muscles]
+
+    @property
+    def crossings(self) -> list[tuple[int, int]]:
+        """Each muscle, by its place in `muscles`, with each of the joints that it crosses."""
+        return [(number, joint) for number, muscle in enumerate(self.muscles) for joint in muscle.joints]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from limb_nodes.levels import UNIT_PROCESSES
 from limb_nodes.levels.limb.chain import point_x, point_y
@@ -17,34 +17,50 @@ Point = tuple[float, float]
 
 
 def has_line(muscle: Muscle) -> bool:
-    """Whether the muscle's path is one from origin over a pulley to insertion (2.43, 2.44)."""
-    return {parameter.name for parameter in PARAMETERS} <= muscle.laws["path"].values.keys()
+    """Whether the muscle's path is drawn: from origin over a pulley to insertion (2.43, 2.44), or through points."""
+    values = muscle.laws["path"].values.keys()
+    return {parameter.name for parameter in PARAMETERS} <= values or "segment_0" in values
 
 
 def muscle_lines(limb: Limb, angle: Sequence[float]) -> dict[str, list[Point]]:
-    """Muscle -> origin, pulley and insertion (m) at joint angles (rad); muscles with other paths have no line.
+    """Muscle -> points of its line (m) at joint angles (rad); muscles with other paths have no line.
 
-    The line is as long as the muscle-tendon unit. Origin and insertion lie on the axes of the joint's two segments,
-    the pulley at the moment arm from the joint, on the line that halves the angle between them.
+    The line is as long as the muscle-tendon unit. Between straight lines they are the points of the path; else origin
+    and insertion, on the axes of the joint's two segments, and the pulley at the moment arm from the joint, on the line
+    that halves the angle between them.
     """
-    joints = dict(zip(point_names(limb), points(limb, angle), strict=True))
+    places = dict(zip(point_names(limb), points(limb, angle), strict=True))
+    # Where each segment begins and in which direction it runs, the base first.
+    starts = [limb.base_position, *(places[name] for name in limb.joint_names)]
+    directions = [limb.base_angle + sum(map(float, angle[:count])) for count in range(len(limb.segments) + 1)]
     lines = {}
-    for muscle in limb.muscles:
-        if not has_line(muscle):
-            continue
+    for muscle in filter(has_line, limb.muscles):
         path = muscle.laws["path"].values
-        x, y = joints[limb.joint_names[muscle.joint]]
-        turn = float(angle[muscle.joint])
-        proximal = limb.base_angle + sum(angle[: muscle.joint])
-        distal = proximal + turn
-        middle = proximal + 0.5 * turn + muscle.role * 0.5 * math.pi
+        if "segment_0" in path:
+            lines[muscle.name] = points_of(path, starts, directions)
+            continue
+        joint = muscle.joints[0]
+        x, y = starts[joint + 1]
+        middle = directions[joint] + 0.5 * float(angle[joint]) + muscle.role * 0.5 * math.pi
         ends = (
-            (-path["proximal_distance"], proximal),
+            (-path["proximal_distance"], directions[joint]),
             (path["moment_arm"], middle),
-            (path["distal_distance"], distal),
+            (path["distal_distance"], directions[joint + 1]),
         )
         lines[muscle.name] = [(point_x(x, far, way), point_y(y, far, way)) for far, way in ends]
     return lines
+
+
+def points_of(path: Mapping[str, float], starts: Sequence[Point], directions: Sequence[float]) -> list[Point]:
+    """The points of a path of straight lines. starts, directions: of the base and the segments (m, rad)."""
+    found = []
+    for number in range(sum(name.startswith("segment_") and not name.startswith("segment_length") for name in path)):
+        segment = int(path[f"segment_{number}"])
+        x, y = starts[segment]
+        for far, way in ((path[f"x_{number}"], 0.0), (path[f"y_{number}"], 0.5 * math.pi)):
+            x, y = point_x(x, far, directions[segment] + way), point_y(y, far, directions[segment] + way)
+        found.append((x, y))
+    return found
 
 
 def maximum_force(muscle: Muscle) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,9 @@ from limb_nodes.model.choice import choose_law, read_law
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.consent import require_consent
 from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
+from limb_nodes.model.path_remarks import warn_of_arms
+from limb_nodes.model.spanning import Crossed, over_joints, read_joints, read_spanning, spans
+from limb_nodes.model.system import crossings_of
 from limb_nodes.model.user_code import NO_CODE, UserCode, named_modules, user_code
 
 BASE_ANGLE = Parameter(
@@ -158,7 +161,7 @@ def build_limb(content: Any, file: str, text: str, code: UserCode | None = NO_CO
     sarcomeres = read_named(top, "sarcomeres")
     kinds = read_named(top, "unit_kinds")
     muscles = tuple(
-        read_muscle(section, joints, sarcomeres, kinds, code) for section in top.sections("muscles", required=False)
+        read_muscle(section, segments, sarcomeres, kinds, code) for section in top.sections("muscles", required=False)
     )
     refuse_duplicates(top, "muscles", "name", [muscle.name for muscle in muscles])
     limb = Limb(
@@ -178,8 +181,9 @@ def build_limb(content: Any, file: str, text: str, code: UserCode | None = NO_CO
     top.finish()
     if code is not None:
         for muscle in muscles:
-            check_geometry(file, muscle, segments[muscle.joint])
+            check_geometry(file, muscle, segments)
         check_laws(limb)
+        warn_of_arms(limb)
     return limb
 
 
@@ -205,17 +209,23 @@ def read_segment(section: Section, code: UserCode | None) -> Segment:
 
 def read_muscle(
     section: Section,
-    joints: list[str],
+    segments: Sequence[Segment],
     sarcomeres: dict[str, Section],
     kinds: dict[str, Section],
     code: UserCode | None,
 ) -> Muscle:
     """One entry of `muscles`."""
     name = section.text("name")
-    joint = section.choice("joint", joints)
-    role = ROLES[section.choice("role", ROLES)]
+    crossed = Crossed(segments, read_joints(section, segments))
     threshold = present(section.number(ACTIVATION_THRESHOLD))
-    laws = {process: choose_law(section, process, code) for process in MUSCLE_PROCESSES}
+    path = read_path(section, crossed, code)
+    # The signs of the moment arms tell it where a path has one for each joint.
+    role = 0.0
+    if crossings_of(path.law) == ("",):
+        role = ROLES[section.choice("role", ROLES)]
+    elif not path.law.equations:
+        section.take("role")
+    laws = {name: path if name == "path" else choose_law(section, name, code) for name in MUSCLE_PROCESSES}
     of_units = {name: choose_law(section, name, code) for name in UNIT_PROCESSES if CONTRACTS[name].section == "muscle"}
     units: list[tuple[float, MotorUnit]] = []
     for position, unit_section in enumerate(section.sections("units", required=True)):
@@ -232,7 +242,14 @@ def read_muscle(
     for place, (unit, unit_threshold) in enumerate(zip(ordered, thresholds, strict=True), 1):
         unit.values["unit_threshold"] = unit_threshold
         unit.values["unit_rank"] = place / len(ordered)
-    return Muscle(name, joints.index(joint), role, threshold, laws, tuple(ordered), section.place)
+    return Muscle(name, crossed.joints, role, threshold, laws, tuple(ordered), section.place)
+
+
+def read_path(section: Section, crossed: Crossed, code: UserCode | None) -> ChosenLaw:
+    """The path of a muscle over its joints."""
+    if spans(section):
+        return read_spanning(section, crossed)
+    return over_joints(section, choose_law(section, "path", code), crossed)
 
 
 def read_units(

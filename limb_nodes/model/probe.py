@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Real
 
-from limb_nodes.levels import CONTRACTS, Equation
+from limb_nodes.levels import Equation
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.curve_checks import number_text
-from limb_nodes.model.system import all_equations
+from limb_nodes.model.system import all_equations, given_of
 
 
 class BrokenLaw(Exception):
@@ -101,7 +101,7 @@ def missing(waiting: list[Step], known: set[str]) -> str:
 def given(chosen: ChosenLaw) -> list[str]:
     """The variables that a law of its process is given from outside, and its states."""
     computed = {item.defines for item in all_equations(chosen.law)}
-    variables = [name for name in CONTRACTS[chosen.law.process].given if name not in computed]
+    variables = [name for name in given_of(chosen.law) if name not in computed]
     return [*variables, *(state.name for state in chosen.law.states)]
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from limb_nodes.foundation.parameter import Parameter
-from limb_nodes.levels import Equation, Law, State, motor_unit, muscle, sarcomere
+from limb_nodes.levels import CONTRACTS, Equation, Law, State, motor_unit, muscle, sarcomere
 
 UNIT_PARAMETERS = (
     *(parameter.name for parameter in motor_unit.PARAMETERS),
@@ -19,7 +19,6 @@ UNIT_PARAMETERS = (
 )
 MUSCLE_PARAMETERS = ("role",)
 UNIT_INPUTS = ("activation", "fibre_length", "fibre_velocity")
-MUSCLE_INPUTS = ("excitation", "joint_angle", "joint_velocity", "total_fibre_force")
 # What laws are given and no movement changes.
 CONSTANTS = frozenset({*UNIT_PARAMETERS, *MUSCLE_PARAMETERS, *(item.defines for item in sarcomere.EQUATIONS)})
 
@@ -123,7 +122,41 @@ def unit_equations(laws: Mapping[str, Law]) -> System:
 
 def muscle_equations(laws: Mapping[str, Law]) -> System:
     """The equations of a muscle around its units, whether they can be solved or not."""
-    return assemble(muscle.EQUATIONS, MUSCLE_PARAMETERS, MUSCLE_INPUTS, laws)
+    crossings = crossings_of(laws["path"])
+    inputs = (
+        "excitation",
+        "total_fibre_force",
+        *(f"joint_{of}{one}" for of in ("angle", "velocity") for one in crossings),
+    )
+    return assemble(muscle.muscle_equations(crossings), MUSCLE_PARAMETERS, inputs, laws)
+
+
+def given_of(law: Law) -> tuple[str, ...]:
+    """The variables that a law is given."""
+    given = CONTRACTS[law.process].given
+    if law.process != "path":
+        return given
+    endings = crossings_of(law)
+    return tuple(f"{name}{one}" for name in given for one in (endings if name.startswith("joint_") else ("",)))
+
+
+def owed_by(law: Law) -> tuple[str, ...]:
+    """The variables that a law owes."""
+    owed = CONTRACTS[law.process].defines
+    if law.process != "path":
+        return owed
+    endings = crossings_of(law) or ("",)
+    return tuple(f"{name}{one}" for name in owed for one in (endings if name == "moment_arm" else ("",)))
+
+
+def crossings_of(path: Law) -> tuple[str, ...]:
+    """What stands behind the names of variables that a muscle has for each joint that it crosses.
+
+    Nothing if the law of the path knows of one joint only, else _0, _1, ... from proximal to distal.
+    """
+    return tuple(
+        item.defines.removeprefix("moment_arm") for item in path.equations if item.defines.startswith("moment_arm")
+    )
 
 
 def tissue_system(law: Law) -> System:

@@ -22,7 +22,7 @@ from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.layout import build_layout, same_structure
 from limb_nodes.model.limb import Limb, Muscle, Segment
 from limb_nodes.solve.failure import SolveError
-from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.outputs import CROSSING_OUTPUTS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import straight
 from limb_nodes.solve.ranges import Ranges
 from limb_nodes.solve.stepping import MuscleStepper
@@ -145,7 +145,7 @@ def on_bench(limb: Limb, name: str) -> tuple[Limb, Muscle]:
         raise UserError(f"{limb.file}: has no muscle {name!r}; allowed: {names or 'none, it has no muscles'}")
     chosen = limb.muscles[limb.muscle_names.index(name)]
     path = ChosenLaw(prescribed, {}, f"{chosen.place}.path")
-    muscle = replace(chosen, joint=0, laws={**chosen.laws, "path": path})
+    muscle = replace(chosen, joints=(0,), laws={**chosen.laws, "path": path})
     return replace(limb, segments=(SUPPORT,), muscles=(muscle,)), muscle
 
 
@@ -335,6 +335,7 @@ class MuscleBench:
         """What the muscle shows at every time."""
         layout = self.model.layout
         muscle = np.zeros((len(time), 1, len(MUSCLE_OUTPUTS)))
+        crossing = np.zeros((len(time), 1, len(CROSSING_OUTPUTS)))
         unit = np.zeros((len(time), layout.units, len(UNIT_OUTPUTS)))
         data, ranges = self.model.new_data(1.0), Ranges(self.model)
         states = np.ascontiguousarray(np.column_stack([length, rate, internal]))
@@ -345,6 +346,7 @@ class MuscleBench:
             layout.model.address,
             data.address,
             muscle,
+            crossing,
             unit,
         )
         return BenchRecord(

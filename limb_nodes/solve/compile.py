@@ -23,7 +23,7 @@ from limb_nodes.solve.generate import program
 IMPORTS = (
     "from limb_nodes.model.chain import HIGHEST, LOWEST\n"
     "from limb_nodes.solve.chain import acceleration, bias_slopes, impact, reaction, solve_free\n"
-    "from limb_nodes.solve.held import held_torque\n"
+    "from limb_nodes.solve.held import held_torque, linear_torque\n"
     "from limb_nodes.solve.pointer import callback, record_at\n"
     "from limb_nodes.solve.problem import FUNCTION\n"
 )

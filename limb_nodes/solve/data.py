@@ -9,9 +9,6 @@ import numpy as np
 from limb_nodes.model.layout import Layout
 from limb_nodes.solve.chain import INERTIA
 
-# The linear model of the torque that holds for one tick, rows of `data.held` (see `limb_nodes.solve.held`).
-HELD_ROWS = 7
-
 
 def data_type(layout: Layout) -> np.dtype[Any]:
     """The type of a limb's data, of n joints; everything is float64.
@@ -20,8 +17,11 @@ def data_type(layout: Layout) -> np.dtype[Any]:
     first: the number of the first of the input's pieces that are there, 0 for those from 0 s on.
     load: [3], force on the tip in x and y (N) and torque on it (N m).
     locked: [n], 1 or -1 while a joint rests on its highest or lowest angle, else 0.
-    torque: [n], of the muscles about each joint (N m). acceleration: [n], of the joints (rad/s^2).
-    held: [7, n], the torque of a tick, its slopes, its state and its curvature (`limb_nodes.solve.held`).
+    torque, torque_t: [n], of the muscles about each joint (N m), and its tangent.
+    acceleration: [n], of the joints (rad/s^2).
+    joints, joints_t: [2 n], joint angles and velocities between two ticks (rad, rad/s); the tangent of those that
+        muscles are given.
+    held: [5 + 2 n, n], the torque of a tick, its slopes, its state and its curvature (`limb_nodes.solve.held`).
     angles_before, velocities_before, angles_after, velocities_after: [n], joint states at a tick's ends
         (rad, rad/s), between which the muscles follow a cubic.
     chain: [4 + n, n], what the chain's equations keep from one stage to the next (`limb_nodes.solve.chain`).
@@ -36,8 +36,11 @@ def data_type(layout: Layout) -> np.dtype[Any]:
         "load": 3,
         "locked": joints,
         "torque": joints,
+        "torque_t": joints,
+        "joints": 2 * joints,
+        "joints_t": 2 * joints,
         "acceleration": joints,
-        "held": (HELD_ROWS, joints),
+        "held": (5 + 2 * joints, joints),
         "angles_before": joints,
         "velocities_before": joints,
         "angles_after": joints,

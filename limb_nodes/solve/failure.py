@@ -115,7 +115,8 @@ def _faults(model: WholeModel, number: int, state: FloatArray, data: Record, goo
     own, internal = layout.model.muscles[number], state[2 * n :]
     kind = layout.muscle_kinds[own.kind]
     part = Part(f"muscle {muscle.name}", muscle.laws, _given(model, kind, own, internal, data))
-    part.values["joint_angle"], part.values["joint_velocity"] = state[own.joint], state[n + own.joint]
+    for one, joint in zip(kind.crossings, muscle.joints, strict=True):
+        part.values[f"joint_angle{one}"], part.values[f"joint_velocity{one}"] = state[joint], state[n + joint]
     part.values["total_fibre_force"] = float(good[own.scratch])
     yield from _drives(part, kind)
     yield from part.walk(kind.stages["before"])

@@ -23,15 +23,16 @@ from limb_nodes.model.kinds import MuscleKind, TissueKind, UnitKind
 from limb_nodes.model.layout import Layout
 from limb_nodes.model.system import BoundEquation
 from limb_nodes.solve.data import data_type
-from limb_nodes.solve.outputs import LENGTHS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.outputs import CROSSING_OUTPUTS, LENGTHS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
 
 # The arguments of all functions that are generated, one of each for every kind of muscle, motor unit or tissue.
 # own: the record of the muscle, the group or (drive, observe) the motor unit; of the muscle in the functions `units_`,
 #   which run over its groups. group: the record of the unit's group.
 # fibre_length, activation, ...: numbers (SI), and with d_ in front their tangents.
+# y: joint angles, then joint velocities; what follows is not read.
 # internal, rates: internal states of the limb and, to be filled in, their rates.
 # model, data: see `Layout` and `data_type`.
-# out: what is filled in: drives, or a row of what is shown.
+# out: what is filled in: drives, or a row of what is shown. crossings: the rows of all muscles' joints.
 ARGUMENTS = {
     "unit_drive": "own, activation, group, model, out",
     "unit_before": "own, fibre_length, activation, internal, model, data",
@@ -42,12 +43,12 @@ ARGUMENTS = {
     "unit_rates_t": "own, fibre_velocity, d_fibre_velocity, model, data",
     "unit_observe": "own, fibre_length, fibre_velocity, activation, internal, group, model, out",
     "muscle_drive": "own, excitation, model, out",
-    "muscle": "own, joint_angle, joint_velocity, internal, rates, model, data",
-    "muscle_t": "own, joint_angle, d_joint_angle, joint_velocity, d_joint_velocity, internal, model, data",
-    "muscle_lengths": "own, joint_angle, joint_velocity, internal, model, out",
+    "muscle": "own, y, internal, rates, model, data",
+    "muscle_t": "own, y, internal, model, data",
+    "muscle_lengths": "own, y, internal, model, out",
     "tissue": "own, joint_angle, joint_velocity, model",
     "tissue_t": "own, joint_angle, d_joint_angle, joint_velocity, d_joint_velocity, model",
-    "muscle_observe": "own, joint_angle, joint_velocity, excitation, internal, model, data, out",
+    "muscle_observe": "own, y, excitation, internal, model, data, out, crossings",
 }
 
 PRELUDE = "import math\n\nimport numpy as np\nfrom numba import carray, from_dtype, njit\n"
@@ -133,11 +134,11 @@ class Body:
             function = item.equation.function
             varying = frozenset(
                 argument
-                for argument, symbol in zip(item.equation.uses, item.symbols, strict=True)
+                for argument, symbol in zip(item.equation.arguments, item.symbols, strict=True)
                 if symbol in self.active
             )
             given = []
-            for argument, symbol in zip(item.equation.uses, item.symbols, strict=True):
+            for argument, symbol in zip(item.equation.arguments, item.symbols, strict=True):
                 given += [symbol, f"d_{symbol}"] if argument in varying else [symbol]
             call = f"{self.equations.name(function, varying)}({', '.join(given)})"
             if varying:
@@ -378,7 +379,20 @@ def load_muscle(body: Body, kind: MuscleKind, extra: set[str]) -> set[str]:
     body.load(kind.columns, used, "model.parameters", "own.parameters")
     body.load(kind.drives, used, "data.drives", "own.drive")
     body.load([state.name for state, _ in kind.system.states], used, "internal", "own.state")
+    load_joints(body, kind, used)
     return used
+
+
+def load_joints(body: Body, kind: MuscleKind, used: set[str], tangents: bool = False) -> None:
+    """Read angles and velocities of the muscle's joints, as far as they are used; tangents: theirs as well."""
+    for place, one in enumerate(kind.crossings):
+        body.add(f"joint{one} = model.crossings[own.crossing + {place}].joint")
+        for name, shift in (f"joint_angle{one}", ""), (f"joint_velocity{one}", "JOINTS + "):
+            if name in used:
+                body.add(f"{name} = y[{shift}joint{one}]")
+                if tangents:
+                    body.add(f"d_{name} = data.joints_t[{shift}joint{one}]")
+                    body.active.add(name)
 
 
 def solve_muscle(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
@@ -400,20 +414,20 @@ def solve_muscle(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> Non
 
 
 def muscle_primal(equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind]) -> str:
-    """Torque, and the rates of the states."""
+    """Adds to the torque about each joint, and tells the rates of the states."""
     body = Body(equations)
     load_muscle(body, kind, set())
     if kind.steady_activation:
         body.add("activation = 0.0")
     solve_muscle(body, kind, units)
-    body.add("return muscle_torque")
+    body.add(*(f"data.torque[joint{one}] += muscle_torque{one}" for one in kind.crossings), "return 0")
     return body.function("muscle", number)
 
 
 def muscle_observe(equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind]) -> str:
     """Everything that a muscle shows."""
     body = Body(equations)
-    load_muscle(body, kind, set(MUSCLE_OUTPUTS))
+    load_muscle(body, kind, set(MUSCLE_OUTPUTS) | {f"moment_arm{one}" for one in kind.crossings})
     if kind.steady_activation:
         body.add("activation = excitation")
         steady = kind.stages["drive"]
@@ -421,6 +435,9 @@ def muscle_observe(equations: Equations, number: int, kind: MuscleKind, units: S
         body.compute(steady)
     body.add("rates = data.rates")
     solve_muscle(body, kind, units)
+    for place, one in enumerate(kind.crossings):
+        body.add(f"shown = crossings[own.crossing + {place}]")
+        body.add(*(f"shown[{i}] = {name}{one}" for i, name in enumerate(CROSSING_OUTPUTS)))
     show(body, kind, MUSCLE_OUTPUTS)
     return body.function("muscle_observe", number)
 
@@ -432,6 +449,7 @@ def muscle_lengths(equations: Equations, number: int, kind: MuscleKind) -> str:
     used = used_by(stage) | set(LENGTHS)
     body.load(kind.columns, used, "model.parameters", "own.parameters")
     body.load([state.name for state, _ in kind.system.states], used, "internal", "own.state")
+    load_joints(body, kind, used)
     body.compute(stage)
     show(body, kind, LENGTHS)
     return body.function("muscle_lengths", number)
@@ -512,12 +530,12 @@ def newton(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
 
 
 def muscle_tangent(equations: Equations, number: int, kind: MuscleKind, units: Sequence[UnitKind]) -> str:
-    """Derivative of torque and rates in a direction, at the force that `muscle` has left in the scratch numbers."""
+    """Derivative of torques and rates in a direction, at the force that `muscle` has left in the scratch numbers."""
     body = Body(equations)
     used = load_muscle(body, kind, set())
     body.load_tangents(kind.drives, used, "data.drives_t", "own.drive")
     body.load_tangents([state.name for state, _ in kind.system.states], used, "data.internal_t", "own.state")
-    body.active |= {"joint_angle", "joint_velocity"}
+    load_joints(body, kind, used, tangents=True)
     if kind.steady_activation:
         body.add("activation = 0.0")
     body.compute(kind.stages["before"])
@@ -541,7 +559,9 @@ def muscle_tangent(equations: Equations, number: int, kind: MuscleKind, units: S
         body.add(f"data.rates_t[own.state + {i}] = {body.slope(state.rate)}")
     if any(unit.system.states for unit in units):
         body.add(call_loop("unit_rates_t", d_fibre_velocity=body.slope("fibre_velocity")))
-    body.add(f"return muscle_torque, {body.slope('muscle_torque')}")
+    body.add(
+        *(f"data.torque_t[joint{one}] += {body.slope(f'muscle_torque{one}')}" for one in kind.crossings), "return 0"
+    )
     return body.function("muscle_t", number)
 
 
@@ -557,9 +577,7 @@ def tissue_function(equations: Equations, number: int, kind: TissueKind, tangent
 
 def dispatcher(name: str, kinds: int) -> str:
     """A function that calls the function `name` of the kind of its first argument."""
-    result = {"muscle": "0.0", "muscle_drive": "0.0", "muscle_t": "0.0, 0.0", "tissue": "0.0", "tissue_t": "0.0"}.get(
-        name, "0"
-    )
+    result = "0.0" if name in ("muscle_drive", "tissue", "tissue_t") else "0"
     lines = by_kind("own", {number: [f"return {call(name, number)}"] for number in range(kinds)}, "    ", kinds)
     return "\n".join([f"@forced\ndef {name}({ARGUMENTS[name]}):", *lines, f"    return {result}\n"])
 

@@ -1,4 +1,4 @@
-"""What muscles, motor units and sarcomeres show, and under which names the messages carry it."""
+"""What muscles, motor units, sarcomeres and torques show, and under which names the messages carry it."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ MUSCLE_OUTPUTS = (
     "fibre_velocity",
     "total_fibre_force",
     "muscle_force",
-    "moment_arm",
-    "muscle_torque",
 )
+# What a muscle shows on each joint that it crosses.
+CROSSING_OUTPUTS = ("moment_arm", "muscle_torque")
 # Those of a muscle that have a range (`limb_nodes.solve.ranges`).
 LENGTHS = ("muscle_tendon_length", "muscle_length", "tendon_length", "aponeurosis_length", "fibre_length")
 UNIT_OUTPUTS = (
@@ -59,3 +59,7 @@ UNIT_FIELDS = {
     "force": "fibre_force",
 }
 SARCOMERE_FIELDS = {"length": "sarcomere_length", "velocity": "sarcomere_velocity", "force": "sarcomere_force"}
+# By topic.
+STATE_FIELDS = {"muscle_state": MUSCLE_FIELDS, "motor_unit_state": UNIT_FIELDS, "sarcomere_state": SARCOMERE_FIELDS}
+# Fields of JointTorque, in the order of the rows in which a torque of n joints stands [2 + 2 n, n].
+TORQUE_FIELDS = ("torque", "slope_time", "slope_angle", "slope_velocity")

@@ -1,7 +1,7 @@
 """The steps that the nodes take: muscles on one side, the chain of segments on the other.
 
-Both sides meet at ticks. The muscles give the torque at a tick with its slopes in joint angle,
-joint velocity and time; the chain advances under that linear model; the muscles then advance
+Both sides meet at ticks. The muscles give the torque at a tick with its slopes in joint angles,
+joint velocities and time; the chain advances under that linear model; the muscles then advance
 their internal states along the cubic through the joint states of both ticks. By how much the
 linear model of one tick missed the torque of the next tells the curvature, which the chain takes
 along into the next tick.
@@ -18,7 +18,7 @@ from limb_nodes.solve.explicit import EXPLICIT
 from limb_nodes.solve.failure import FAILURES, SolveError, fault_of
 from limb_nodes.solve.held import hold, predict
 from limb_nodes.solve.integrate import DONE, integrate
-from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.outputs import CROSSING_OUTPUTS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import bent, straight
 from limb_nodes.solve.problem import CONTROL, give_inputs, new_problem
 from limb_nodes.solve.ranges import Ranges
@@ -64,6 +64,7 @@ class MuscleStepper:
         self._row = self._state[np.newaxis]
         self.ranges = Ranges(self.model)
         self._muscles = np.zeros((layout.muscles, len(MUSCLE_OUTPUTS)))
+        self._crossings = np.zeros((layout.crossings, len(CROSSING_OUTPUTS)))
         self._units = np.zeros((layout.units, len(UNIT_OUTPUTS)))
         self._control = tick_control()
         self._start()
@@ -111,9 +112,12 @@ class MuscleStepper:
         self.internal[:], self._data.scratch[:] = np.split(values, [self.internal.size])
 
     @property
-    def shown(self) -> tuple[FloatArray, FloatArray]:
-        """The arrays that `observe` fills in."""
-        return self._muscles, self._units
+    def shown(self) -> dict[str, FloatArray]:
+        """What `observe` fills in, by name of `MUSCLE_OUTPUTS` [muscles], `CROSSING_OUTPUTS` [crossings] and so on."""
+        tables = (
+            (self._muscles, MUSCLE_OUTPUTS), (self._crossings, CROSSING_OUTPUTS), (self._units, UNIT_OUTPUTS)
+        )  # fmt: skip
+        return {name: table[:, i] for table, names in tables for i, name in enumerate(names)}
 
     def drive(self, excitation: FloatArray) -> FloatArray:
         """What excitations [muscles] do to muscles and motor units [drives]."""
@@ -129,14 +133,14 @@ class MuscleStepper:
         period: float,
         last_drive: FloatArray | None = None,
     ) -> FloatArray:
-        """Torque [n] (N m) and its slopes in angle, velocity and time, rows of [4, n].
+        """Torque (N m), its slope in time, in the angles and in the velocities: 1, 1, n and n rows of [2 + 2 n, n].
 
         drive, next_drive: at this tick and one `period` (s) later. last_drive: one period before,
         if it is known; the input is then a parabola instead of a straight line.
         """
         self._set_state(angle, velocity)
         self._data.period[0] = period
-        out = np.empty((4, self.joints))
+        out = np.empty((2 + 2 * self.joints, self.joints))
         model = self.model
         model.program.torque_slopes(
             self._state, tick_input(last_drive, drive, next_drive), model.layout.model.address, self._data.address, out
@@ -179,14 +183,14 @@ class MuscleStepper:
             raise SolveError(f"{self.model.limb.file}: the muscles cannot be advanced: {FAILURES[status]}")
 
     def observe(self, angle: FloatArray, velocity: FloatArray, excitation: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What muscles [muscles, MUSCLE_OUTPUTS] and units [units, UNIT_OUTPUTS] show.
+        """What muscles [muscles, MUSCLE_OUTPUTS] and units [units, UNIT_OUTPUTS] show; see also `shown`.
 
         Both arrays are used again by the next call.
         """
         self._set_state(angle, velocity)
         model = self.model
         records = model.layout.model.address, self._data.address
-        model.program.observe(self._state, excitation, *records, self._muscles, self._units)
+        model.program.observe(self._state, excitation, *records, self._muscles, self._crossings, self._units)
         return self._muscles, self._units
 
     def look(self) -> bool:
@@ -229,7 +233,7 @@ class LimbStepper:
 
     def _rehearse(self, start: FloatArray) -> None:
         """Do what a tick does, so that it is compiled and loaded before the first."""
-        torque = np.zeros((4, self.joints))
+        torque = np.zeros((2 + 2 * self.joints, self.joints))
         self.acceleration(torque)
         self.step(torque, REHEARSAL)
         self.step(torque, REHEARSAL)
@@ -271,14 +275,14 @@ class LimbStepper:
         self._predicted = self._expected if values[-1] else NO_TIMES
 
     def acceleration(self, torque: FloatArray) -> FloatArray:
-        """Joint accelerations [n] (rad/s^2) at the current tick under rows of torque [4, n]."""
+        """Joint accelerations [n] (rad/s^2) at the current tick under rows of torque [2 + 2 n, n]."""
         data, model = self._data, self.model
         hold(self._commanded(torque), self._state, NO_TIMES, 1.0, data.held)
         model.program.limb_rates(0.0, self._state, NO_ROWS, model.layout.model.address, data.address, self._rates)
         return self._rates[self.joints :].copy()
 
     def step(self, torque: FloatArray, period: float) -> None:
-        """Advance by `period` (s) under torque and slopes [4, n]. Raises SolveError."""
+        """Advance by `period` (s) under torque and slopes [2 + 2 n, n]. Raises SolveError."""
         data = self._data
         predicted = self._predicted + self.command if self._predicted.size else self._predicted
         hold(self._commanded(torque), self._state, predicted, period, data.held)
@@ -297,7 +301,7 @@ class LimbStepper:
             self._predicted = NO_TIMES
 
     def _commanded(self, torque: FloatArray) -> FloatArray:
-        """Rows of torque [4, n] of muscles and command."""
+        """Rows of torque [2 + 2 n, n] of muscles and command."""
         both = torque.copy()
         both[0] += self.command
         return both

@@ -171,7 +171,7 @@ def changed(limb: Limb, changes: dict[Slot, float]) -> Limb:
     for index, pairs in owned["muscle"].items():
         muscles[index] = changed_muscle(muscles[index], pairs)
         if any(slot.kind == "law" or slot.name in LENGTHS for slot, _ in pairs):
-            check_geometry(limb.file, muscles[index], segments[muscles[index].joint])
+            check_geometry(limb.file, muscles[index], segments)
     return replace(limb, segments=tuple(segments), muscles=tuple(muscles), **own)
 
 

@@ -22,7 +22,7 @@ from limb_nodes.solve.data import data_type
 from limb_nodes.solve.drive_table import DriveTable
 from limb_nodes.solve.failure import FAILURES, SolveError, where
 from limb_nodes.solve.integrate import NOT_FINITE, difference_slopes
-from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.outputs import CROSSING_OUTPUTS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import pieces
 from limb_nodes.solve.problem import give_inputs, new_problem
 
@@ -45,7 +45,9 @@ class Movement:
     time: s [T]. angle, velocity, acceleration: rad, rad/s, rad/s^2 [T, n].
     internal: internal states [T, states], named by `state_names`.
     excitation: [T, muscles]. steps: accepted and rejected steps of the integrator.
-    muscle: by name of `MUSCLE_OUTPUTS` [T, muscles]. unit: by name of `UNIT_OUTPUTS` [T, units].
+    muscle: by name of `MUSCLE_OUTPUTS` [T, muscles], and of `CROSSING_OUTPUTS` [T, crossings of muscles and joints], in
+        the order of `Limb.crossings`.
+    unit: by name of `UNIT_OUTPUTS` [T, units].
     """
 
     time: FloatArray
@@ -286,6 +288,7 @@ class WholeModel:
         shown = len(states) if seen else 0
         acceleration = np.empty((shown, n))
         muscle = np.zeros((shown, layout.muscles, len(MUSCLE_OUTPUTS)))
+        crossing = np.zeros((shown, layout.crossings, len(CROSSING_OUTPUTS)))
         unit = np.zeros((shown, layout.units, len(UNIT_OUTPUTS)))
         if seen:
             moving, still = seen
@@ -294,7 +297,8 @@ class WholeModel:
                 times, states, stretch.inputs, layout.model.address, moving.address, acceleration
             )
             given = np.ascontiguousarray(excitation, dtype=np.float64)
-            self.program.observe_all(states, given, layout.model.address, still.address, muscle, unit)
+            records = layout.model.address, still.address
+            self.program.observe_all(states, given, *records, muscle, crossing, unit)
         return Movement(
             time=times,
             angle=states[:, :n],
@@ -303,7 +307,11 @@ class WholeModel:
             internal=states[:, 2 * n :],
             state_names=layout.state_names,
             excitation=excitation,
-            muscle={name: muscle[:, :, i] for i, name in enumerate(MUSCLE_OUTPUTS)},
+            muscle={
+                name: table[:, :, i]
+                for table, names in ((muscle, MUSCLE_OUTPUTS), (crossing, CROSSING_OUTPUTS))
+                for i, name in enumerate(names)
+            },
             unit={name: unit[:, :, i] for i, name in enumerate(UNIT_OUTPUTS)},
             steps=steps,
         )

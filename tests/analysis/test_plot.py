@@ -14,7 +14,7 @@ from matplotlib.legend import Legend
 from matplotlib.text import Text
 from numpy.testing import assert_allclose, assert_array_equal
 
-from limb_nodes.analysis.plot.limbs import instants, muscle_path, posture
+from limb_nodes.analysis.plot.limbs import instants, posture
 from limb_nodes.analysis.plot.panels import columns_of, look_of
 from limb_nodes.analysis.plot.picture import picture
 from limb_nodes.analysis.plot.series import Series, read_series
@@ -23,7 +23,6 @@ from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.topics import TOPIC_TYPES
-from limb_nodes.levels.muscle.path import muscle_tendon_length
 from limb_nodes.model import load_limb, parse_limb
 from limb_nodes.model.points import points
 from limb_nodes.signals.emg import envelopes
@@ -194,19 +193,6 @@ def test_the_bag_alone_is_enough_to_draw_the_limb(run_bag: Path) -> None:
         assert axes.get_aspect() == 1.0
     marks = [line.get_xdata()[0] for line in panel(figure, "angle").lines if line.get_linestyle() == ":"]
     assert_allclose(marks, [float(str(axes.get_label()).split(":")[1]) for axes in limbs])
-
-
-@pytest.mark.parametrize("angle", [-1.2, 0.0, 0.3, 2.0])
-def test_a_muscle_is_drawn_as_long_as_the_model_says(angle: float) -> None:
-    for muscle in load_limb(PARAMS / "seated_knee.yaml").muscles:
-        path = muscle_path(muscle, np.array([0.2, -0.1]), 0.7, angle)
-        assert path is not None
-        length = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
-        values = muscle.laws["path"].values
-        wanted = muscle_tendon_length(
-            angle, muscle.role, values["moment_arm"], values["proximal_distance"], values["distal_distance"]
-        )
-        assert length == pytest.approx(wanted, rel=1e-12)
 
 
 def test_a_posture_has_its_muscles_at_their_activation(run_bag: Path) -> None:

@@ -187,9 +187,9 @@ def test_the_graph_equals_the_steppers(reference, limb, waves, bags):
             "joint_states.position": angle,
             "joint_states.velocity": velocity,
             "joint_torque.torque": rows[0],
-            "joint_torque.slope_angle": rows[1],
-            "joint_torque.slope_velocity": rows[2],
-            "joint_torque.slope_time": rows[3],
+            "joint_torque.slope_time": rows[1],
+            "joint_torque.slope_angle": rows[2],
+            "joint_torque.slope_velocity": rows[3],
             "movement_pattern.angle": angle,
             "movement_pattern.acceleration": chain.acceleration(rows),
         }

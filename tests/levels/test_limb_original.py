@@ -32,7 +32,7 @@ def joint_torques(limb, movement):
     """2.61: torque of every joint [T, 3]."""
     torques = np.zeros_like(movement.angle)
     for j, muscle in enumerate(limb.muscles):
-        torques[:, muscle.joint] += movement.muscle["muscle_torque"][:, j]
+        torques[:, muscle.joints[0]] += movement.muscle["muscle_torque"][:, j]
     return torques
 
 

@@ -33,7 +33,7 @@ def test_a_line_is_as_long_as_its_muscle_and_tendon(path):
         for muscle in limb.muscles:
             values = muscle.laws["path"].values
             geometry = (values[name] for name in ("moment_arm", "proximal_distance", "distal_distance"))
-            expected = muscle_tendon_length(angle[muscle.joint], muscle.role, *geometry)
+            expected = muscle_tendon_length(angle[muscle.joints[0]], muscle.role, *geometry)
             origin, pulley, insertion = lines[muscle.name]
             assert math.dist(origin, pulley) + math.dist(pulley, insertion) == pytest.approx(expected, rel=1e-12)
 
@@ -43,14 +43,14 @@ def test_origin_and_insertion_lie_on_the_segments_of_the_joint():
     angle = [0.4, 0.7]
     places = dict(zip(point_names(limb), points(limb, angle), strict=True))
     for muscle in limb.muscles:
-        joint = places[limb.joint_names[muscle.joint]]
-        after = places["tip" if muscle.joint == 1 else limb.joint_names[1]]
+        joint = places[limb.joint_names[muscle.joints[0]]]
+        after = places["tip" if muscle.joints[0] == 1 else limb.joint_names[1]]
         origin, pulley, insertion = muscle_lines(limb, angle)[muscle.name]
         values = muscle.laws["path"].values
         assert math.dist(pulley, joint) == pytest.approx(values["moment_arm"])
         along = np.subtract(after, joint) / math.dist(after, joint)
         np.testing.assert_allclose(np.subtract(insertion, joint), values["distal_distance"] * along, atol=1e-12)
-        if muscle.joint == 1:
+        if muscle.joints[0] == 1:
             before = np.subtract(joint, places[limb.joint_names[0]])
             back = -values["proximal_distance"] * before / np.linalg.norm(before)
             np.testing.assert_allclose(np.subtract(origin, joint), back, atol=1e-12)

@@ -86,7 +86,7 @@ def test_the_base_is_good():
     assert limb.joint_names == ["shoulder", "elbow"]
     assert limb.muscle_names == ["flexor", "extensor"]
     assert [unit.name for unit in limb.muscles[0].units] == ["first", "second_1", "second_2"]
-    assert limb.muscles[0].joint == 1
+    assert limb.muscles[0].joints == (1,)
     assert (limb.muscles[0].role, limb.muscles[1].role) == (1.0, -1.0)
     assert limb.segments[0].joint_range == (-1.0, 1.5)
     assert limb.segments[1].joint_range is None

@@ -79,9 +79,11 @@ def test_what_is_shown_is_what_the_whole_model_shows(limb_named, model_named, si
     whole = model_named("reference_joint_tendon").simulate(excitation, 1000.0, method="explicit")
     muscles = MuscleStepper(limb_named("reference_joint_tendon"))
     muscles.internal[:] = whole.internal[100]
-    shown, units = muscles.observe(whole.angle[100], whole.velocity[100], excitation[100])
-    np.testing.assert_allclose(shown, np.stack([values[100] for values in whole.muscle.values()], axis=1), rtol=1e-12)
-    np.testing.assert_allclose(units, np.stack([values[100] for values in whole.unit.values()], axis=1), rtol=1e-12)
+    muscles.observe(whole.angle[100], whole.velocity[100], excitation[100])
+    wanted = {**whole.muscle, **whole.unit}
+    assert muscles.shown.keys() == wanted.keys()
+    for name, values in muscles.shown.items():
+        np.testing.assert_allclose(values, wanted[name][100], rtol=1e-12, err_msg=name)
 
 
 def test_a_load_on_the_tip(limb_named, model_named):

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 
 from limb_nodes import solve
 from limb_nodes.model import layout
-from limb_nodes.solve.outputs import MUSCLE_OUTPUTS, UNIT_OUTPUTS
+from limb_nodes.solve.held import slope_rows
+from limb_nodes.solve.outputs import CROSSING_OUTPUTS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import pieces, straight
 
 LIMBS = ["reference_joint", "reference_joint_tendon", "seated_knee", "arm", "pennate_leg"]
@@ -123,8 +124,9 @@ def test_the_loop_is_closed_anywhere(name, model_named):
     muscle = np.zeros((count, layout.muscles, len(MUSCLE_OUTPUTS)))
     unit = np.zeros((count, layout.units, len(UNIT_OUTPUTS)))
     excitation = rng.uniform(0.0, 1.0, (count, layout.muscles))
+    crossing = np.zeros((count, layout.crossings, len(CROSSING_OUTPUTS)))
     data = model.new_data(1.0)
-    model.program.observe_all(states, excitation, layout.model.address, data.address, muscle, unit)
+    model.program.observe_all(states, excitation, layout.model.address, data.address, muscle, crossing, unit)
     total, each = muscle[:, :, MUSCLE_OUTPUTS.index("total_fibre_force")], unit[:, :, UNIT_OUTPUTS.index("fibre_force")]
     for m, columns in enumerate(unit_columns(limb)):
         solved = np.isfinite(total[:, m])
@@ -150,8 +152,8 @@ PERIOD = 1e-3
 
 
 def total_torque(model, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Torque about each joint and its slopes [4, n]."""
-    out = np.empty((4, model.layout.joints))
+    """Torque about each joint and its slopes [2 + 2 n, n]."""
+    out = np.empty((2 + 2 * model.layout.joints, model.layout.joints))
     data = model.new_data(PERIOD)
     model.program.torque_slopes(y, u, model.layout.model.address, data.address, out)
     return out
@@ -181,15 +183,15 @@ def test_slopes_of_the_torque(name, model_named, waves):
             far = torque(2 * change, 2 * per) - torque(-2 * change, -2 * per)
             return (8 * near - far) / 12
 
-        for j in range(n):
-            for block, at in ((1, j), (2, n + j)):
+        for block, slopes_of in enumerate(slope_rows(slopes)):
+            for j in range(n):
                 step = 1e-5
-                found_slope = difference(step * np.eye(y.size)[at], 0.0)[j] / step
-                assert slopes[block, j] == pytest.approx(found_slope, rel=1e-5, abs=1e-6)
+                found_slopes = difference(step * np.eye(y.size)[block * n + j], 0.0) / step
+                np.testing.assert_allclose(slopes_of[:, j], found_slopes, rtol=1e-5, atol=1e-6)
                 checked += 1
         drift = np.concatenate([np.zeros(2 * n), rates[2 * n :]])
         step = 1e-5
-        np.testing.assert_allclose(slopes[3], difference(step * drift, step) / step, rtol=1e-4, atol=1e-5)
+        np.testing.assert_allclose(slopes[1], difference(step * drift, step) / step, rtol=1e-4, atol=1e-5)
     assert checked == 6 * n
 
 
@@ -241,7 +243,7 @@ def test_compiled_equals_interpreted(name, model_named, waves):
         space["rates"](row / rate, y, program.u, layout.model.address, data.address, out)
         np.testing.assert_allclose(out, program(row / rate, y), rtol=1e-9, atol=1e-9)
         u = np.ascontiguousarray(program.u[:1])
-        slopes = np.empty((4, layout.joints))
+        slopes = np.empty((2 + 2 * layout.joints, layout.joints))
         data = model.new_data(PERIOD)
         space["torque_slopes"](y, u, layout.model.address, data.address, slopes)
         np.testing.assert_allclose(slopes, total_torque(model, y, u), rtol=1e-8, atol=1e-8)

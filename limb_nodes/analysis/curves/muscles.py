@@ -14,6 +14,7 @@ from limb_nodes.analysis.curves.uses import Use, law_names, legend, muscle_uses,
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import ChosenLaw, Limb, Muscle
 from limb_nodes.model.probe import Probe, given, initial_states
+from limb_nodes.model.system import crossings_of
 
 # A limb without limits on its joints turns once around.
 FREE = (-math.pi, math.pi)
@@ -101,17 +102,22 @@ def resting_length(probe: Probe, states: dict[str, float], force: float, slack: 
     return float(brentq(velocity, slack, longest, xtol=1e-12)) if velocity(slack) > 0.0 else slack
 
 
-def joint_angles(limb: Limb, muscle: Muscle) -> FloatArray:
-    """Joint angles (rad) over the range of a muscle's joint."""
-    low, high = limb.segments[muscle.joint].joint_range or FREE
+def joint_angles(limb: Limb, joint: int) -> FloatArray:
+    """Angles (rad) over the range of a joint."""
+    low, high = limb.segments[joint].joint_range or FREE
     return np.linspace(low, high, POINTS)
 
 
-def path_values(muscle: Muscle, angles: FloatArray, variable: str) -> FloatArray:
-    """A variable of a muscle's path by joint angle."""
+def path_values(limb: Limb, muscle: Muscle, joint: int, angles: FloatArray, variable: str) -> FloatArray:
+    """A variable of a muscle's path by the angle of one of its joints, the others as at the start."""
     chosen = muscle.laws["path"]
     probe = Probe(chosen, given(chosen), {"role": muscle.role})
-    return np.array([probe.at(joint_angle=float(angle), joint_velocity=0.0)[variable] for angle in angles])
+    point: dict[str, float] = {}
+    for ending, crossed in zip(crossings_of(chosen.law), muscle.joints, strict=True):
+        point |= {f"joint_angle{ending}": limb.segments[crossed].angle, f"joint_velocity{ending}": 0.0}
+    ending = crossings_of(chosen.law)[muscle.joints.index(joint)]
+    shown = f"{variable}{ending}" if variable == "moment_arm" else variable
+    return np.array([probe.at(**{**point, f"joint_angle{ending}": float(angle)})[shown] for angle in angles])
 
 
 def paths(limb: Limb) -> Characteristic:
@@ -130,9 +136,12 @@ def moment_arms(limb: Limb) -> Characteristic:
 def by_angle(limb: Limb, variable: str, diagram: Characteristic) -> Characteristic:
     """The diagram with a variable of each muscle's path by joint angle."""
     diagram.laws = law_names(muscle.laws["path"] for muscle in limb.muscles)
-    for muscle in limb.muscles:
-        angles = joint_angles(limb, muscle)
-        diagram.add(Curve(muscle.name, angles, path_values(muscle, angles, variable), muscle.name))
+    for number, joint in limb.crossings:
+        muscle, angles = limb.muscles[number], joint_angles(limb, joint)
+        label = muscle.name if len(muscle.joints) == 1 else f"{muscle.name}, {limb.joint_names[joint]}"
+        diagram.add(Curve(label, angles, path_values(limb, muscle, joint, angles, variable), muscle.name))
+    if any(len(muscle.joints) > 1 for muscle in limb.muscles):
+        diagram.note = "by one joint, others as at the start"
     return diagram
 
 
@@ -143,7 +152,12 @@ def pennation(limb: Limb) -> Characteristic:
     pennate: list[Use] = []
     for use in muscle_uses(limb, "aponeurosis"):
         slack = use.muscle.laws["tendon"].values.get("slack_length", 0.0)
-        lengths = path_values(use.muscle, joint_angles(limb, use.muscle), "muscle_tendon_length") - slack
+        lengths = -slack + np.concatenate(
+            [
+                path_values(limb, use.muscle, joint, joint_angles(limb, joint), "muscle_tendon_length")
+                for joint in use.muscle.joints
+            ]
+        )
         span = np.linspace(max(1e-4, float(lengths.min())), float(lengths.max()), POINTS)
         probe = Probe(use.chosen, given(use.chosen), {"muscle_velocity": 0.0, "total_fibre_force": 0.0})
         states = initial_states(use.chosen, probe)

@@ -16,6 +16,7 @@ from limb_nodes.analysis.export.quantities import (
     Quantity,
     base,
     names_of,
+    naming,
     values_of,
 )
 from limb_nodes.bags.columns import Columns
@@ -90,7 +91,7 @@ def in_degrees(columns: list[Column]) -> tuple[list[Column], FloatArray]:
 
 def _direct(source: str, topic: str, quantity: Quantity, fields: Columns) -> Part | None:
     """The columns of one quantity; None if the messages leave its values out."""
-    missing = [name for name in (quantity.field, *quantity.of) if name not in fields]
+    missing = [name for name in (quantity.field, *naming(fields, quantity)) if name not in fields]
     if missing:
         raise UserError(f"{source}: topic {topic} has no field {missing[0]}; a bag that limb wrote is needed")
     names, width = names_of(fields, quantity), values_of(fields, quantity).shape[1]

@@ -17,7 +17,8 @@ class Quantity:
     """A field of a message with one value for each name.
 
     field: of the message. suffix: what follows the name, empty for activations and angles. unit: of SI; empty for none.
-    of: the fields that hold the names. part: which number of each value, if a value is a point.
+    of: the fields that hold the names. part: which number of each value, if a value is a point. apart: the field that
+    tells names apart that are the same.
     """
 
     field: str
@@ -25,6 +26,7 @@ class Quantity:
     unit: str
     of: tuple[str, ...] = ("name",)
     part: int | None = None
+    apart: str = ""
 
 
 _UNIT = ("muscle", "unit")
@@ -53,7 +55,7 @@ QUANTITIES: dict[str, tuple[Quantity, ...]] = {
         Quantity("pennation_angle", "pennation_angle", "rad"),
         Quantity("fibre_force", "fibre_force", "N"),
         Quantity("muscle_force", "muscle_force", "N"),
-        Quantity("torque", "torque", "N m"),
+        Quantity("torque", "torque", "N m", ("torque_muscle",), apart="torque_joint"),
     ),
     "limb_msgs/msg/MotorUnitState": (
         Quantity("stimulation_frequency", "stimulation_frequency", "Hz", _UNIT),
@@ -101,9 +103,19 @@ def base(topic: str) -> str:
     return topic.rpartition("/")[2]
 
 
+def naming(fields: Columns, quantity: Quantity) -> tuple[str, ...]:
+    """The fields that hold the names of a quantity; in bags of former versions each torque is that of a muscle."""
+    return ("name",) if quantity.apart and not len(fields.get(quantity.apart, ())) else quantity.of
+
+
 def names_of(fields: Columns, quantity: Quantity) -> list[str]:
     """What the values of a quantity belong to; a motor unit is named after its muscle and itself."""
-    return ["_".join(map(str, parts)) for parts in zip(*(fields[key] for key in quantity.of), strict=True)]
+    of = naming(fields, quantity)
+    names = ["_".join(map(str, parts)) for parts in zip(*(fields[key] for key in of), strict=True)]
+    if not quantity.apart or of != quantity.of or len(set(names)) == len(names):
+        return names
+    apart = fields[quantity.apart]
+    return [f"{name}_{apart[place]}" if names.count(name) > 1 else name for place, name in enumerate(names)]
 
 
 def values_of(fields: Columns, quantity: Quantity) -> FloatArray:

@@ -11,7 +11,8 @@ from limb_nodes.analysis.plot.panels import look_of
 from limb_nodes.analysis.plot.series import BagSeries, Series
 from limb_nodes.analysis.style import DARK, GREY, LIGHT, WHITE
 from limb_nodes.foundation.arrays import FloatArray
-from limb_nodes.model import Limb, Muscle
+from limb_nodes.model import Limb
+from limb_nodes.model.lines import muscle_lines
 from limb_nodes.model.points import points
 
 if TYPE_CHECKING:
@@ -56,34 +57,14 @@ def posture(run: BagSeries, limb: Limb, sample: int) -> Posture:
     angle = np.array([run.angle.column(name)[sample] for name in limb.joint_names])
     # Points alternate: joint, centre of mass, joint, ..., tip.
     bones = np.array(points(limb, list(angle))[::2])
-    directions = limb.base_angle + np.concatenate([[0.0], np.cumsum(angle)])
     drawn, reach = [], BASE * sum(segment.length for segment in limb.segments)
-    for muscle in limb.muscles:
-        path = muscle_path(muscle, bones[muscle.joint], directions[muscle.joint], angle[muscle.joint])
-        if path is not None:
-            drawn.append((muscle.name, path, _activation(run, muscle.name, time)))
-            if muscle.joint == 0:
-                reach = max(reach, float(np.linalg.norm(path[0] - bones[0])))
+    for name, line in muscle_lines(limb, list(angle)).items():
+        path = np.array(line)
+        drawn.append((name, path, _activation(run, name, time)))
+        if limb.muscles[limb.muscle_names.index(name)].joints[0] == 0:
+            reach = max(reach, float(np.linalg.norm(path[0] - bones[0])))
     base = np.array([bones[0] - reach * _unit(limb.base_angle), bones[0]])
     return Posture(time, bones, base, tuple(drawn))
-
-
-def muscle_path(muscle: Muscle, joint: FloatArray, proximal: float, angle: float) -> FloatArray | None:
-    """Origin, pulley and insertion, between which the length is that of (2.43-2.44); None for a path of another kind.
-
-    joint: its position. proximal: direction of the segment before it (rad). angle: of the joint.
-    """
-    values = muscle.laws["path"].values
-    if not {"moment_arm", "proximal_distance", "distal_distance"} <= values.keys():
-        return None
-    middle = proximal + 0.5 * angle + muscle.role * 0.5 * np.pi
-    return np.array(
-        [
-            joint - values["proximal_distance"] * _unit(proximal),
-            joint + values["moment_arm"] * _unit(middle),
-            joint + values["distal_distance"] * _unit(proximal + angle),
-        ]
-    )
 
 
 def frame(postures: list[Posture]) -> tuple[float, float, float, float]:

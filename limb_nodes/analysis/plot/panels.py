@@ -128,7 +128,7 @@ def _joints(run: BagSeries) -> tuple[str, ...]:
 
 
 def _muscles_of(limb: Limb, joint: str) -> tuple[str, ...]:
-    return tuple(muscle.name for muscle in limb.muscles if limb.joint_names[muscle.joint] == joint)
+    return tuple(muscle.name for muscle in limb.muscles if joint in (limb.joint_names[one] for one in muscle.joints))
 
 
 def _column(run: BagSeries, title: str, muscles: Sequence[str], *joints: str) -> Column:
@@ -151,7 +151,7 @@ def _with_role(run: BagSeries, name: str) -> str:
     if run.limb is None:
         return name
     role = run.limb.muscles[run.limb.muscle_names.index(name)].role
-    short = "flexor" if role > 0 else "extensor"
+    short = {1.0: "flexor", -1.0: "extensor"}.get(role, name)
     return name if name == short else f"{name} ({short})"
 
 
@@ -233,7 +233,7 @@ def _of_joint(text: str, joints: Sequence[str]) -> str:
 
 
 def _torque(run: BagSeries, muscles: Sequence[str], joints: Sequence[str]) -> Panel | None:
-    by_muscle = _muscle_lines(run, run.muscles["torque"], muscles) if "torque" in run.muscles else ()
+    by_muscle = _muscle_lines(run, _torques_on(run, joints), muscles) if "torque" in run.muscles else ()
     net = _joint_lines(run.torque, joints, "net torque") if run.torque is not None else []
     if not by_muscle and not net:
         return None
@@ -241,6 +241,15 @@ def _torque(run: BagSeries, muscles: Sequence[str], joints: Sequence[str]) -> Pa
     broad = tuple(Line(line.label, line.times, line.values, NET, line.style, BROAD) for line in net)
     thin = tuple(Line("", line.times, line.values, line.colour, line.style) for line in by_muscle)
     return Panel("torque", _of_joint("Torque at the", joints), "N m", (*broad, *thin), legend=True)
+
+
+def _torques_on(run: BagSeries, joints: Sequence[str]) -> Series:
+    """The torques of muscles on some joints, by muscle."""
+    torque = run.muscles["torque"]
+    if not run.torque_joints:
+        return torque
+    there = [place for place, joint in enumerate(run.torque_joints) if joint in joints]
+    return Series(tuple(torque.names[place] for place in there), torque.times, torque.values[:, there])
 
 
 def _angle(run: BagSeries, joints: Sequence[str]) -> Panel | None:

@@ -70,6 +70,7 @@ class BagSeries:
     limb: None in a bag without one, such as an envelope bag. drive: activations, or the envelopes of a bag without
     activations (`is_envelope`). owners: the muscle of each motor unit of `frequency`. muscles: by field of MuscleState.
     raw: what the envelopes were made of. remarks: what was noticed when they were made, one sentence each.
+    torque_joints: the joint of each torque of `muscles`.
     angle, velocity, torque: by joint, rad, rad/s, N m. reference: recorded angles by joint, rad. start, end: s.
     source: what the bag was made of, if it holds no limb. notes: what a person should know, one sentence each.
     """
@@ -87,6 +88,7 @@ class BagSeries:
     frequency: Series | None = None
     owners: tuple[str, ...] = ()
     muscles: dict[str, Series] = field(default_factory=dict)
+    torque_joints: tuple[str, ...] = ()
     torque: Series | None = None
     angle: Series | None = None
     velocity: Series | None = None
@@ -309,7 +311,13 @@ def _read_muscles(bag: _Bag) -> dict[str, Any]:
         return {}
     table = bag.table(topic)
     names = bag.names(topic, table)
-    return {"muscles": {field: bag.cut(topic, table, names, field) for field in MUSCLE_FIELDS}}
+    found = {field: bag.cut(topic, table, names, field) for field in MUSCLE_FIELDS if field != "torque"}
+    owners = names
+    joints: tuple[str, ...] = ()
+    # In bags of former versions every muscle has one torque.
+    if len(table.get("torque_muscle", ())):
+        owners, joints = (bag.names(topic, table, f"torque_{of}") for of in ("muscle", "joint"))
+    return {"muscles": {**found, "torque": bag.cut(topic, table, owners, "torque")}, "torque_joints": joints}
 
 
 def _read_joints(bag: _Bag) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from limb_nodes.analysis.structure.relations import Assembly, Relation, Term, Va
 from limb_nodes.levels.equation import ScalarFunction, equation_of
 from limb_nodes.levels.limb import chain, original, transformed
 from limb_nodes.model import Limb
+from limb_nodes.model.system import crossings_of
 
 ORIGINAL, TRANSFORMED, INTERFACE = "limb_original", "limb_transformed", "limb_interface"
 TIP_FORCE = {name: (Term(Variable("", name)),) for name in ("tip_force_x", "tip_force_y")}
@@ -63,7 +64,12 @@ def interface(limb: Limb, level: str) -> list[Relation]:
     relations = []
     previous = ""
     for k, segment in enumerate(limb.segments):
-        torques = tuple(Term(Variable(m.name, "muscle_torque")) for m in limb.muscles if m.joint == k)
+        torques = tuple(
+            Term(Variable(m.name, f"muscle_torque{ending}"))
+            for m in limb.muscles
+            for ending, joint in zip(crossings_of(m.laws["path"].law), m.joints, strict=True)
+            if joint == k
+        )
         (torque,) = of(segment.name, "joint_torque")
         relations.append(Relation("2.61", segment.name, level, torque, torques))
         for item, angle in (

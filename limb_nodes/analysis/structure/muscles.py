@@ -5,25 +5,33 @@ Its checks are left out, so that a system that cannot run can still be examined.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 
 from limb_nodes.analysis.structure.relations import Assembly, Relation, Term, Variable
 from limb_nodes.levels import CONTRACTS, MUSCLE_PROCESSES, UNIT_PROCESSES, Equation, Law
 from limb_nodes.model import Limb, MotorUnit, Muscle
-from limb_nodes.model.system import UNIT_INPUTS, BoundEquation, System, muscle_equations, unit_equations
+from limb_nodes.model.system import (
+    UNIT_INPUTS,
+    BoundEquation,
+    System,
+    crossings_of,
+    muscle_equations,
+    owed_by,
+    unit_equations,
+)
 
 SARCOMERE, UNIT, MUSCLE, TENDON, APONEUROSIS = "sarcomere", "motor_unit", "muscle", "tendon", "aponeurosis"
 # Of what the level of the muscle defines, the report puts these into its sub-level.
-TENDON_VARIABLES = ("tendon_force", "muscle_torque")
+TENDON_VARIABLES = re.compile(r"tendon_force|muscle_torque(_\d+)?")
 COMPUTED_PARAMETER = "unit_threshold"
-JOINT_INPUTS = ("joint_angle", "joint_velocity")
 
 
 def muscle_assembly(limb: Limb) -> Assembly:
     """The equations of all muscles with their motor units; joint angles and excitations are given."""
     assembly = Assembly()
     for one in limb.muscles:
-        add_muscle(assembly, one, limb.segments[one.joint].name)
+        add_muscle(assembly, one, [limb.segments[joint].name for joint in one.joints])
     return assembly
 
 
@@ -53,11 +61,15 @@ def level_of(law: Law, defines: str) -> str:
     return CONTRACTS[law.process].level
 
 
-def add_muscle(assembly: Assembly, one: Muscle, segment: str) -> None:
-    """Append a muscle, its motor units and the sums over them."""
+def add_muscle(assembly: Assembly, one: Muscle, segments: Sequence[str]) -> None:
+    """Append a muscle, its motor units and the sums over them. segments: those behind the joints that it crosses."""
     units = [unit_owner(one, unit) for unit in one.units]
     laws = {process: one.laws[process].law for process in MUSCLE_PROCESSES}
-    names = {name: Variable(segment, name) for name in JOINT_INPUTS}
+    names = {
+        f"{name}{ending}": Variable(segment, name)
+        for ending, segment in zip(crossings_of(laws["path"]), segments, strict=True)
+        for name in ("joint_angle", "joint_velocity")
+    }
     add_system(assembly, one.name, muscle_equations(laws), laws, names)
     for unit, owner in zip(one.units, units, strict=True):
         laws = {process: unit.laws[process].law for process in UNIT_PROCESSES}
@@ -97,7 +109,7 @@ def add_system(
             assembly.parameters[Variable(owner, name)] = parameter_level(name, home)
     for bound in system.equations:
         if not bound.process:
-            add(bound, TENDON if bound.defines in TENDON_VARIABLES else home)
+            add(bound, TENDON if TENDON_VARIABLES.fullmatch(bound.defines) else home)
     for process, law in laws.items():
         for bound in system.equations:
             if bound.process == process:
@@ -107,7 +119,7 @@ def add_system(
         for state in law.states:
             level, rate = level_of(law, state.name), term(state.rate)
             assembly.add(Relation(state.number, owner, level, term(state.name, 1), (rate,), process))
-        for name in CONTRACTS[process].defines:
+        for name in owed_by(law):
             assembly.variables.setdefault(term(name).variable, level_of(law, name))
 
 

@@ -82,7 +82,10 @@ GREEK = {"α": r"\alpha", "β": r"\beta", "θ": r"\theta", "ω": r"\omega"}
 
 
 def symbol(name: str) -> str:
-    """The symbol of a variable, its own name if the report has none."""
+    """The symbol of a variable, its own name if the report has none; of several joints with the joint's number."""
+    whole, _, number = name.rpartition("_")
+    if number.isdigit() and whole in SYMBOLS:
+        return f"{SYMBOLS[whole]},{int(number) + 1}"
     return SYMBOLS.get(name, name)
 
 

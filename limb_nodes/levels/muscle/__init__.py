@@ -10,7 +10,7 @@ from limb_nodes.levels.muscle import (
     tendon,
     toe_region,
 )
-from limb_nodes.levels.muscle.whole import EQUATIONS
+from limb_nodes.levels.muscle.whole import EQUATIONS, muscle_equations
 
 __all__ = [
     "EQUATIONS",
@@ -19,6 +19,7 @@ __all__ = [
     "constant_thickness",
     "first_order",
     "geometric_path",
+    "muscle_equations",
     "path",
     "tendon",
     "toe_region",

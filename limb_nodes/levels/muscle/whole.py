@@ -5,7 +5,9 @@ l_M+T muscle_tendon_length, v_M+T muscle_tendon_velocity, l_T tendon_length, v_T
 F_M muscle_force, F_T tendon_force, M_M muscle_torque, r_M moment_arm.
 """
 
-from limb_nodes.levels.equation import equation, equation_of
+from dataclasses import replace
+
+from limb_nodes.levels.equation import Equation, equation, equation_of
 
 
 @equation("2.49", "muscle_length")
@@ -32,4 +34,22 @@ def muscle_torque(tendon_force: float, moment_arm: float, role: float) -> float:
     return -role * tendon_force * moment_arm
 
 
+@equation("virtual work", "muscle_torque")
+def torque_on_joint(tendon_force: float, moment_arm: float) -> float:
+    """Torque (N m) about one of several joints; the moment arm has the sign of what the muscle does there."""
+    return -tendon_force * moment_arm
+
+
 EQUATIONS = tuple(equation_of(function) for function in (muscle_length, muscle_velocity, tendon_force, muscle_torque))
+
+
+def muscle_equations(crossings: tuple[str, ...]) -> tuple[Equation, ...]:
+    """The equations of a muscle over joints whose variables have these endings; ("",) for the report's one joint."""
+    if crossings == ("",):
+        return EQUATIONS
+    on_joint = equation_of(torque_on_joint)
+    torques = (
+        replace(on_joint, defines=f"muscle_torque{one}", named=("tendon_force", f"moment_arm{one}"))
+        for one in crossings
+    )
+    return *EQUATIONS[:-1], *torques

@@ -36,7 +36,9 @@ def model_text(limb: Limb) -> str:
         arm = muscle.role * muscle.laws["path"].values["moment_arm"]
         force = sum(unit.values["parallel_sarcomeres"] for unit in muscle.units) * 1e-12
         reach = abs(arm) * np.pi
-        muscles += f'<muscle joint="joint{muscle.joint}" gear="{-arm}" force="{force}" lengthrange="{-reach} {reach}"/>'
+        muscles += (
+            f'<muscle joint="joint{muscle.joints[0]}" gear="{-arm}" force="{force}" lengthrange="{-reach} {reach}"/>'
+        )
     return (
         f'<mujoco><compiler angle="radian" autolimits="false"/><option timestep="{STEP}" integrator="Euler" '
         f'gravity="{limb.gravity[0]} 0 {limb.gravity[1]}"><flag contact="disable"/></option>'

@@ -27,7 +27,7 @@ def muscle_description(limb: Limb) -> list[dict[str, float]]:
         series = sum(unit.values["series_sarcomeres"] for unit in muscle.units) / len(muscle.units)
         found.append(
             {
-                "joint": muscle.joint,
+                "joint": muscle.joints[0],
                 "role": muscle.role,
                 "force": sum(unit.values["parallel_sarcomeres"] for unit in muscle.units) * 9.7778e-13,
                 "optimal": series * SPECIFIC_LENGTH,
