@@ -23,6 +23,7 @@ from limb_nodes.model.limb import Limb
 ROOT = Path(__file__).resolve().parents[2]
 LIMBS = [*sorted((ROOT / "params").glob("*_joint*.yaml")), ROOT / "params/pennate_leg.yaml"]
 ALTERNATIVES = ROOT / "tests/levels/alternatives.yaml"
+TWO_JOINTS = ROOT / "tests/levels/two_joint_leg.yaml"
 IDENTITY = "0123456789abcdef" * 2
 TICKS = Ticks(500.0)
 FINAL = 3 * CHECKPOINT
@@ -82,7 +83,7 @@ def cut(messages: list[Message], tick: int) -> list[Message]:
     return messages[: torques[tick]]
 
 
-@pytest.mark.parametrize("file", [*LIMBS, ALTERNATIVES], ids=lambda path: path.stem)
+@pytest.mark.parametrize("file", [*LIMBS, ALTERNATIVES, TWO_JOINTS], ids=lambda path: path.stem)
 def test_a_run_goes_on_where_it_was_cut_short(file):
     limb, whole = undisturbed(file)
     for tick in CUTS:

@@ -11,6 +11,7 @@ import pytest
 from rosbags.rosbag2 import Reader
 
 from limb_nodes.bags.read import BagReader
+from limb_nodes.cli import main
 from limb_nodes.model import load_limb
 from limb_nodes.nodes.session import CLASSES, run_in_one_process, run_in_processes
 from limb_nodes.nodes.settings import RunSettings, checked
@@ -59,6 +60,27 @@ def test_four_processes_give_the_same_values(reference, limb, waves, bags, tmp_p
     outcome = run_in_processes(run, seen.append)
     assert (outcome.ticks, outcome.missing, outcome.bad_input) == (TICKS, 0, 0)
     assert bags.differences(reference, tmp_path / "run") == []
+
+
+def test_muscles_over_two_joints_in_one_process_and_in_four(bags, tmp_path, own_signals):
+    """Also when run again from the bag."""
+    leg = str(Path(__file__).parents[1] / "levels" / "two_joint_leg.yaml")
+    constant = ",".join(f"{name}={0.3 + 0.05 * place:.2f}" for place, name in enumerate(load_limb(leg).muscle_names))
+    one, four = (checked(RunSettings(leg, constant, RATE, 0.3, str(tmp_path / name)))[0] for name in ("one", "four"))
+    run_in_one_process(one, lambda tick: None)
+    run_in_processes(four, lambda tick: None)
+    assert bags.differences(tmp_path / "one", tmp_path / "four") == []
+    with BagReader(tmp_path / "one") as bag:
+        torque, state = bag.table("joint_torque"), bag.table("muscle_state")
+    assert torque["slope_angle"].shape == (301, 9)
+    slopes = torque["slope_velocity"][150].reshape(3, 3)
+    # The hip's torque and the ankle's do not depend on each other: no muscle crosses both.
+    assert slopes[0, 2] == slopes[2, 0] == 0.0
+    assert abs(slopes[0, 1]) > 0.0
+    on_knee = state["torque_joint"] == "knee"
+    np.testing.assert_allclose(state["torque"][:, on_knee].sum(axis=1), torque["torque"][:, 1], rtol=1e-9, atol=1e-9)
+    assert main(["rerun", str(tmp_path / "one"), "--out", str(tmp_path / "again")]) == 0
+    assert bags.differences(tmp_path / "one", tmp_path / "again") == []
 
 
 @pytest.mark.parametrize(
