@@ -5,6 +5,8 @@ from __future__ import annotations
 from limb_nodes.errors import UserError
 
 SECOND = 1_000_000_000
+# Of a run (Hz).
+LOWEST_RATE, HIGHEST_RATE = 1e-3, 100_000.0
 
 
 class Ticks:
@@ -14,8 +16,8 @@ class Ticks:
     """
 
     def __init__(self, rate: float) -> None:
-        if not 0.0 < rate <= 100_000.0:
-            raise UserError(f"rate is {rate:g}; a number > 0 and <= 100000 in Hz is needed")
+        if not LOWEST_RATE <= rate <= HIGHEST_RATE:
+            raise UserError(f"rate is {rate:g}; a number >= {LOWEST_RATE:g} and <= {HIGHEST_RATE:g} in Hz is needed")
         self.rate = rate
         self.nanoseconds = round(SECOND / rate)
         self.period = self.nanoseconds / SECOND

@@ -16,9 +16,12 @@ LOOK_PERIOD = 0.25
 class Watch:
     """Looks at what goes on. waited: how long nothing has (s)."""
 
-    def __init__(self, limit: float, start: float, soon: float = SOON) -> None:
-        """limit: of waiting, after the first tick. start, soon: how long the first and others may take unsaid (s)."""
-        self._limit, self._start, self._soon = limit, start, soon
+    def __init__(self, limit: float, start: float, soon: float = SOON, *, patient: bool = True) -> None:
+        """limit: of waiting. start, soon: how long the first tick and others may take unsaid (s).
+
+        patient: whether the first tick may take longer than the limit.
+        """
+        self._limit, self._start, self._soon, self._patient = limit, start, soon, patient
         self.waited = 0.0
         self._say_at = start
         self._done: int | None = None
@@ -44,4 +47,4 @@ class Watch:
     @property
     def given_up(self) -> bool:
         """Whether it has waited too long."""
-        return self._done is not None and self._done > 0 and self.waited >= self._limit
+        return self._done is not None and (self._done > 0 or not self._patient) and self.waited >= self._limit

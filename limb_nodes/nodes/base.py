@@ -6,7 +6,7 @@ import difflib
 import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -22,7 +22,7 @@ from limb_nodes.errors import RunError, UserError, clean
 from limb_nodes.exchange.identity import FORM, is_identity
 from limb_nodes.exchange.part import Part
 from limb_nodes.exchange.recorded import RecordedRun
-from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.exchange.ticks import HIGHEST_RATE, LOWEST_RATE, Ticks
 from limb_nodes.exchange.watch import LOOK_PERIOD, STALL, STALL_LIMIT, Watch
 from limb_nodes.foundation.topics import PUBLIC, exchanged
 from limb_nodes.model import Limb, load_limb
@@ -62,20 +62,22 @@ class LimbNode(Node):
     """A node of one limb at one rate.
 
     part: what it does in a run. failure: why it cannot go on, and the exit status, for whoever spins it; a text,
-    because an error would keep the node and all that it knows alive. former: the identities of the runs in whose place
+    because an error would keep the node and all that it knows alive. typed: names of the parameters that a person has
+    typed for this node alone. former: the identities of the runs in whose place
     this one began, the last one last. following: that of the run that is to begin in place of this one, once it is
     known.
     """
 
     part: Part
 
-    def __init__(self, name: str, former: Sequence[str] = (), **options: Any) -> None:
+    def __init__(self, name: str, former: Sequence[str] = (), typed: Collection[str] = (), **options: Any) -> None:
         super().__init__(name, **options)
-        self.former = former
+        self.former, self.typed = former, typed
         self.failure: tuple[str, type[UserError]] | None = None
         self.following = ""
         self._last_complaint = -math.inf
         self._told = 0
+        self._last_refused = ""
         self.steps, self._counts = Steps(), Counts()
         self.diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", LIVE)
         path = self.text("limb", "", "the limb's YAML file")
@@ -84,7 +86,9 @@ class LimbNode(Node):
         allow_laws = self.switch("allow_laws", False, "run the code of the limb's own laws, also if it is not trusted")
         self.limb: Limb = load_limb(path, allow_laws)
         self.mode = self.choice("mode", MODES, "lockstep: tick after tick as fast as possible; realtime: by the clock")
-        self.ticks = Ticks(self.number("rate", 1000.0, "ticks per second of simulation time", 0.0, 100_000.0))
+        self.ticks = Ticks(
+            self.number("rate", 1000.0, "ticks per second of simulation time", LOWEST_RATE, HIGHEST_RATE)
+        )
         self.given_identity = self.text(
             "identity", "", f"identity of the run, {FORM}; empty: a new one (limb_dynamics), that of the run (others)"
         )
@@ -94,9 +98,11 @@ class LimbNode(Node):
             "priority", 0, "real-time priority of all threads of the process (SCHED_FIFO); 0: none", 0, HIGHEST
         )
         self.resume = self.text("resume", "", "bag of the run that this node goes on with; empty: a new run")
-        meaning = "end the run if no tick has come for so long, s"
+        meaning = "end the run if no tick has come for so long, s; if it is given, also before the first tick"
         limit = self.number("stall_limit", STALL_LIMIT, meaning, STALL.minimum or 0.0, STALL.maximum or 0.0)
-        self.watch = Watch(limit, math.inf if PARENT in os.environ else UNSAID)
+        child = PARENT in os.environ
+        patient = child or "stall_limit" not in given_parameters(self)
+        self.watch = Watch(limit, math.inf if child else UNSAID, patient=patient)
 
     @property
     def finished(self) -> bool:
@@ -167,9 +173,15 @@ class LimbNode(Node):
         """Offer what a person may ask for who has started the node."""
 
     def refuse_unknown(self) -> None:
-        """Raise UserError for a parameter that no node of a limb has."""
+        """Raise UserError for a parameter that no node of a limb has, and for one that is typed in vain."""
         for name in given_parameters(self):
-            if not self.has_parameter(name) and name not in PARAMETERS and not name.startswith(ROS_PARAMETERS):
+            if self.has_parameter(name) or name.startswith(ROS_PARAMETERS):
+                continue
+            if name in PARAMETERS and name in self.typed:
+                raise UserError(
+                    f"{self.get_name()}: {name} is a parameter of another node of the limb, not of this one"
+                )
+            if name not in PARAMETERS:
                 near = difflib.get_close_matches(name, parameter_values(self), 1)
                 meant = f"; {near[0]} is meant perhaps" if near else ""
                 raise UserError(f"{self.get_name()}: {name} is no parameter of this node{meant}")
@@ -273,6 +285,7 @@ class LimbNode(Node):
     def complain(self, what: str) -> None:
         """Say what is wrong with a message that is not taken, once per second at most."""
         now = time.monotonic()
+        self._last_refused = clean(what)
         if now - self._last_complaint >= 1.0:
             self._last_complaint = now
             self.get_logger().warning(f"{clean(what)}; it is not taken ({self.refused} so far)")
@@ -287,7 +300,8 @@ class LimbNode(Node):
         """Publish once a second how the node does: a warning if something has gone wrong lately."""
         wrong = ", ".join(f"{count} {name}" for name, count in self._counts.lately(self.counts).items() if count)
         lately = f"{wrong} in the last {WINDOW:g} s" if wrong else ""
-        self.diagnose("; ".join(filter(None, (self.state(), lately))), WARN if wrong else OK, **self.steps.told("step"))
+        values = {**self.steps.told("step"), **({"last_refused": self._last_refused} if self._last_refused else {})}
+        self.diagnose("; ".join(filter(None, (self.state(), lately))), WARN if wrong else OK, **values)
 
     def state(self) -> str:
         """In words, what the node is at."""

@@ -15,6 +15,8 @@ from limb_nodes.solve.small import finite
 
 # What may be left of a force or a torque out of the plane: of its size in the plane.
 ROUNDING = 1e-9
+# Greater forces (N) and torques (N m) are a mistake of units: they would tear any limb.
+MOST = 1e6
 
 
 def load_of(message: WrenchStamped, limb: Limb, angle: FloatArray, prefix: str) -> FloatArray:
@@ -28,6 +30,8 @@ def load_of(message: WrenchStamped, limb: Limb, angle: FloatArray, prefix: str) 
     apart = {"force.z": force.z, "torque.x": torque.x, "torque.y": torque.y}
     if not finite(np.array([*values, *apart.values()])):
         raise ValueError("a force or torque is not finite")
+    if np.abs(values).max() > MOST:
+        raise ValueError(f"a force or torque is {np.abs(values).max():g}; {MOST:g} in N or N m at most is needed")
     for name, value in apart.items():
         if abs(value) > ROUNDING * float(np.linalg.norm(values)):
             raise ValueError(f"{name} is {value:g}; the limb moves in the plane x, y, and 0 is needed")
@@ -51,13 +55,19 @@ def direction_of(frame: str, limb: Limb, angle: FloatArray, prefix: str) -> floa
 def command_of(message: JointState, limb: Limb) -> FloatArray:
     """The commanded torque on each joint [n] (N m), 0 for those that are not named. Raises ValueError."""
     joints = limb.joint_names
+    if message.name and not message.effort:
+        raise ValueError("has no efforts; a limb is commanded by torques alone, not by positions or velocities")
     if len(message.effort) != len(message.name) or not message.name:
         raise ValueError(f"has {len(message.name)} names and {len(message.effort)} efforts; as many are needed")
     values = np.zeros(len(joints))
-    for name, effort in zip(message.name, message.effort, strict=True):
+    for place, (name, effort) in enumerate(zip(message.name, message.effort, strict=True)):
         if name not in joints:
             raise ValueError(f"names {name[:80]}; one of {', '.join(joints)} is needed")
+        if name in message.name[:place]:
+            raise ValueError(f"names {name} a second time; each joint once is needed")
         values[joints.index(name)] = effort
     if not finite(values):
         raise ValueError("an effort is not finite")
+    if np.abs(values).max() > MOST:
+        raise ValueError(f"an effort is {np.abs(values).max():g}; {MOST:g} N m at most is needed")
     return values

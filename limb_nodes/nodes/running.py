@@ -27,6 +27,7 @@ from limb_nodes.edge import guarded
 from limb_nodes.errors import FieldError
 from limb_nodes.nodes.base import PARENT, STAY
 from limb_nodes.nodes.distribution import make_executor
+from limb_nodes.nodes.typed import typed_last, typed_parameters
 
 # The executor is asked for one event at a time with a time-out: without one it hangs when idle.
 SPIN_TIMEOUT = 0.05
@@ -89,15 +90,18 @@ def run_guarded(node_class: Callable[..., Any], args: Sequence[str] | None) -> i
     interrupt = Interrupt()
     given: dict[str, Any] = {}
     former: tuple[str, ...] = ()
+    arguments = list(sys.argv if args is None else args)
     while True:
         # A run has a context of its own: what the middleware has kept for the one before cannot hold it up.
         context = Context()
         try:
-            init_ros(context, args)
+            with typed_last(arguments, name_of(node_class)) as all_arguments:
+                init_ros(context, all_arguments)
             node = node_class(
                 context=context,
                 parameter_overrides=[Parameter(key, value=given[key]) for key in given],
                 former=former[-FORMER:],
+                typed=typed_parameters(arguments),
             )
             given = run_once(node, context, interrupt)
         finally:
@@ -105,6 +109,11 @@ def run_guarded(node_class: Callable[..., Any], args: Sequence[str] | None) -> i
         if not given:
             return 0
         former = (*former, node.part.identity)
+
+
+def name_of(node_class: Callable[..., Any]) -> str:
+    """The name of a node by that of its class: limb_dynamics of LimbDynamics."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", node_class.__name__).lower()
 
 
 def run_once(node: Any, context: Context, interrupt: Interrupt) -> dict[str, Any]:

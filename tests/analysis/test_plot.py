@@ -448,6 +448,13 @@ def test_a_bag_without_anything_to_draw(tmp_path: Path) -> None:
         read_series(tmp_path / "bag")
 
 
+def test_a_bag_of_a_run_that_never_began(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag", {}) as bag:
+        bag.expect({topic: TOPIC_TYPES[topic] for topic in ("activation", "joint_states")})
+    with pytest.raises(UserError, match=r"bag: /activation, /joint_states have no messages, nothing to draw"):
+        read_series(tmp_path / "bag")
+
+
 def test_a_limb_that_cannot_be_read_is_left_out_and_noted(tmp_path: Path) -> None:
     info = {"limb": "name: x\n", "limb_file": "x.yaml"}
     with BagWriter(tmp_path / "bag", info) as bag:

@@ -26,6 +26,14 @@ def test_before_the_first_tick_others_have_time_to_start():
     assert not watch.given_up
 
 
+def test_before_the_first_tick_it_is_given_up_if_that_is_wanted():
+    watch = Watch(limit=3.0, start=9.0, patient=False)
+    said(watch, 3.0 - STEP, done=0)
+    assert not watch.given_up
+    said(watch, 2 * STEP, done=0, start=3.0 - STEP)
+    assert watch.given_up
+
+
 def test_what_is_awaited_is_said():
     watch = Watch(limit=100.0, start=9.0)
     words = [watch.look(STEP * k, 5, "joint_torque of muscle_stack") for k in range(round(SOON / STEP) + 1)]

@@ -72,6 +72,8 @@ def test_a_load_in_the_frame_of_the_last_segment_turns_with_all_joints(arm):
         (load(force_x=5.0, torque_x=-0.1), "torque.x is -0.1"),
         (load(torque_y=2.0, torque_z=1.0), "torque.y is 2"),
         (load(force_x=NAN), "not finite"),
+        (load(force_x=1e9), "a force or torque is 1e.09; 1e.06 in N or N m at most is needed"),
+        (load(torque_z=-2e6), "a force or torque is 2e.06"),
         (load(force_z=NAN), "not finite"),
         (load("tool0", force_x=1.0), "frame_id is tool0; one of base, upper_arm, forearm_and_hand is needed"),
         (load("upper_arm\n", force_x=1.0), "frame_id is"),
@@ -86,12 +88,14 @@ def test_a_load_that_a_limb_in_the_plane_cannot_take_is_refused(message, said, a
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
-        ({"name": ["elbow"], "effort": []}, "1 names and 0 efforts"),
+        ({"name": ["elbow"], "effort": []}, "has no efforts; a limb is commanded by torques alone"),
+        ({"name": ["elbow", "elbow"], "effort": [1.0, 2.0]}, "names elbow a second time; each joint once is needed"),
+        ({"name": ["elbow"], "effort": [1e7]}, "an effort is 1e.07; 1e.06 N m at most is needed"),
         ({"name": [], "effort": []}, "0 names and 0 efforts"),
         ({"name": ["elbow"], "effort": [1.0, 2.0]}, "1 names and 2 efforts"),
         ({"name": ["wrist"], "effort": [1.0]}, "names wrist; one of shoulder, elbow is needed"),
         ({"name": ["elbow"], "effort": [NAN]}, "not finite"),
-        ({"name": ["elbow"], "position": [1.0]}, "1 names and 0 efforts"),
+        ({"name": ["elbow"], "position": [1.0]}, "has no efforts; a limb is commanded by torques alone"),
     ],
     ids=str,
 )
@@ -282,6 +286,8 @@ def test_diagnostics_are_ok_again_after_a_while(bench, limb, monkeypatch):
     node.part.refuse("joint_command: nothing")
     node.report()
     graph.until(lambda: (newest().level == DiagnosticStatus.WARN and "lately") or "last 10 s" in newest().message, "it")
+    graph.until(lambda: {pair.key: pair.value for pair in newest().values}.get("last_refused"), "what was refused")
+    assert {pair.key: pair.value for pair in newest().values}["last_refused"] == "joint_command: nothing"
     now += health.WINDOW + 1.0
     node.report()
     monkeypatch.undo()

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+import signal
 from pathlib import Path
 
 import pytest
+from rclpy.parameter_client import AsyncParameterClient
 
 from limb_nodes import cli
 from limb_nodes.bags.types import make_message
@@ -160,6 +162,10 @@ def test_each_node_refuses(node, given, parts, folder, limb, capfd):
         ("recorder", {"out": "''"}, ["out"]),
         ("recorder", {"out": "there"}, ["there"]),
         ("recorder", {"out": "7"}, ["out", "7"]),
+        # Typed for a node that does not have it; a file of parameters may be for all nodes.
+        ("limb_dynamics", {"duration": "5.0"}, ["duration is a parameter of another node"]),
+        ("activation_input", {"out": "x"}, ["out is a parameter of another node"]),
+        ("recorder", {"durations": "5.0"}, ["durations is no parameter"]),
     ],
     ids=str,
 )
@@ -176,6 +182,34 @@ def refuse(node, given, parts, folder, limb, capfd):
     assert run_node(CLASSES[node], arguments) == 2
     one_line(capfd.readouterr().err, *parts)
     assert sorted(folder.rglob("*")) == before
+
+
+def test_what_is_typed_wins_over_a_section_of_a_file(limb, processes, tmp_path, bench):
+    """Wherever the node is, and in the form that ROS reads."""
+    file = tmp_path / "all.yaml"
+    file.write_text(
+        f"/**:\n  ros__parameters: {{limb: {limb}, rate: 200.0, duration: 3.0}}\n"
+        f"/**/recorder:\n  ros__parameters: {{out: {tmp_path / 'file'}, rate: 100.0}}\n"
+    )
+    graph = bench()
+    typed = ["-p", f"out:={tmp_path / 'typed'}", "-p", "rate:=5e2", "-r", "__ns:=/left"]
+    node = processes.start(
+        "-m", "limb_nodes.nodes.recorder", "--ros-args", *typed, "--params-file", str(file), "-p", "priority:=0"
+    )
+    client = AsyncParameterClient(graph.probe, "/left/recorder")
+    graph.until(client.services_are_ready, "the recorder")
+    answer = client.get_parameters(["out", "rate"])
+    graph.until(answer.done, "its parameters")
+    out, rate = answer.result().values
+    assert (out.string_value, rate.double_value) == (str(tmp_path / "typed"), 500.0)
+    node.signal(signal.SIGTERM)
+    assert node.wait() == 0
+
+
+def test_a_node_that_waits_in_vain_gives_up_at_the_limit_that_it_was_given(limb, processes):
+    node = processes.node("muscle_stack", limb=limb, stall_limit=1.0)
+    assert node.wait() == 1
+    assert "has waited 1 s for limb_state of tick 0 from limb_dynamics" in node.said
 
 
 def test_a_whole_number_is_a_rate_too(bench, limb):

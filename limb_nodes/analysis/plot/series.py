@@ -235,6 +235,11 @@ def _prefix(reader: BagReader, namespace: str) -> str:
         if name in known and name in DRAWN and reader.has(topic):
             drawn.add(prefix)
     there = ", ".join(sorted(prefix.strip("/") or "/" for prefix in drawn))
+    empty = [topic for topic in reader.topics if topic.rpartition("/")[2] in DRAWN]
+    if not drawn and empty:
+        raise UserError(
+            f"{reader.path}: {', '.join(empty)} have no messages, nothing to draw; a run that has begun is needed"
+        )
     if not drawn:
         raise UserError(
             f"{reader.path}: has {', '.join(reader.topics) or 'no topic'}, nothing to draw; "
