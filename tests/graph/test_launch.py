@@ -56,6 +56,14 @@ def test_one_limb(limb, processes, bags, tmp_path):
     bags.complete(tmp_path / "run", 251, 2_000_000)
 
 
+def test_a_node_that_fails_ends_the_others_and_is_named(limb, processes, tmp_path):
+    file = Path(parameters(tmp_path, "run", limb))
+    file.write_text(file.read_text().replace("flexor=0.9", "flexor=9"))
+    child = processes.start("-c", LAUNCH, str(ROOT / "limb_nodes/launch/limb.launch.py"), f"params_file:={file}")
+    assert child.wait() in (0, 1), child.all_said
+    assert "activation_input-1 ended with status 2; the other nodes end, too" in child.printed + child.all_said
+
+
 def test_two_limbs(limb, processes, bags, tmp_path):
     files = [f"{side}_params_file:={parameters(tmp_path, side, limb)}" for side in ("left", "right")]
     child = processes.start("-c", LAUNCH, str(ROOT / "limb_nodes/launch/two_limbs.launch.py"), *files)
