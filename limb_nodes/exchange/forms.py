@@ -97,17 +97,20 @@ def forms_of(limb: Limb) -> dict[str, Form]:
         "muscle": [muscle.name for muscle in limb.muscles for _ in muscle.units],
         "unit": [unit.name for muscle in limb.muscles for unit in muscle.units],
     }
+    torque = {
+        "joint": joints,
+        **zeros(["torque", "slope_time"], len(joints)),
+        **zeros(["slope_angle", "slope_velocity"], len(joints) ** 2),
+    }
     units, layout = len(of_unit["unit"]), build_layout(limb)
     remembered = layout.states + layout.scratch + 2 * (layout.joints + layout.drives) + 1
     corner = make_message("geometry_msgs/msg/Point")
     fields: dict[str, dict[str, Any]] = {
         "activation": {"name": muscles, **zeros(["activation"], len(muscles))},
         "limb_state": {"joint": joints, **zeros(["angle", "velocity"], len(joints))},
-        "joint_torque": {
-            "joint": joints,
-            **zeros(["torque", "slope_time"], len(joints)),
-            **zeros(["slope_angle", "slope_velocity"], len(joints) ** 2),
-        },
+        "joint_torque": torque,
+        "limb_impact": {"joint": joints, **zeros(["angle", "velocity_before", "velocity_after"], len(joints))},
+        "impact_torque": {**torque, "last_tick": -1},
         "movement_pattern": {
             "joint": joints,
             "point": points,

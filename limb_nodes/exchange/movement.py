@@ -18,7 +18,7 @@ from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model.points import points
 from limb_nodes.solve.held import slope_rows
 from limb_nodes.solve.outputs import TORQUE_FIELDS
-from limb_nodes.solve.stepping import LimbStepper
+from limb_nodes.solve.stepping import Impact, LimbStepper
 
 REMEMBERED = 1000
 # How long the limb goes on with a torque in real time (s). Farther its slopes say nothing.
@@ -35,7 +35,8 @@ class LimbPart(Part):
     tick: that the limb is at. last_tick: of the run, -1 while it is not known. missed: deadlines. started_at: when real
     time began (s of the monotonic clock). recorded: the newest tick that the recorder has, -1 before. again: whether it
     goes on from what is recorded. joint_states: messages for everybody. command, load: what acts from outside.
-    commanded: the newest tick that a command answers, -1 before.
+    commanded: the newest tick that a command answers, -1 before. struck: the impact within the tick that waits for its
+    torque. impacts: how many have it.
     """
 
     def __init__(
@@ -56,7 +57,11 @@ class LimbPart(Part):
         self.awaits_recorder, self.command_every = awaits_recorder, command_every
         self.joint_states = Outgoing(joint_states_form(self.limb, frame_prefix), self.ticks.nanoseconds)
         self.commanded = self.shown = -1
-        self.stepper = LimbStepper(self.limb)
+        # In real time nobody can wait for a torque in the middle of a tick.
+        self.stepper = LimbStepper(self.limb, asks=not self.realtime)
+        self.struck: Impact | None = None
+        self.impacts = 0
+        self.impact_torques: dict[int, FloatArray] = {}
         self.command = Held(self.stepper.command, self.in_ticks(command_timeout))
         self.load = Held(self.stepper.load, self.in_ticks(load_timeout))
         self.tick = 0
@@ -72,8 +77,10 @@ class LimbPart(Part):
         self.started_at: float | None = None
         self.last_tick = -1
         self.state, self.pattern = self.sends("limb_state"), self.sends("movement_pattern")
-        self.checkpoint = self.sends("limb_checkpoint")
+        self.checkpoint, self.impact = self.sends("limb_checkpoint"), self.sends("limb_impact")
         self.takes("joint_torque", self.on_torque, gaps=self.realtime)
+        if self.stepper.model.limited and not self.realtime:
+            self.takes("impact_torque", self.on_impact_torque, gaps=False)
 
     def in_ticks(self, seconds: float) -> int:
         """A time in ticks, 1 at least; 0 stays 0."""
@@ -85,9 +92,13 @@ class LimbPart(Part):
             self.offer()
 
     def offer(self) -> None:
-        """Send the state at the current tick."""
+        """Send the state at the current tick, or the impact within it."""
         self.begun = True
+        if self.struck is not None:
+            self.send_impact(self.struck)
+            return
         values = self.state.values
+        values["impacts"][...] = self.impacts
         values["angle"][:], values["velocity"][:] = self.stepper.angle, self.stepper.velocity
         self.state.publish(self.tick)
         if self.tick % CHECKPOINT == 0:
@@ -109,7 +120,7 @@ class LimbPart(Part):
         if self.realtime and tick > self.tick and not self.again:
             self.refuse(f"joint_torque: a message is of tick {tick}, which has not been; the limb is at {self.tick}")
             return
-        rows = self.rows(data)
+        rows = self.rows("joint_torque", data)
         self.last_tick = self.forms["joint_torque"].number(data, "last_tick")
         if not self.realtime:
             self.pending.append(rows)
@@ -123,7 +134,8 @@ class LimbPart(Part):
 
     def go_on(self) -> None:
         """In lockstep, step as far as torques are there and the recorder is near."""
-        while self.pending and self.begun and not self.finished and not self.ahead:
+        self.meet_impacts()
+        while self.pending and self.begun and self.struck is None and not self.finished and not self.ahead:
             self.show(self.pending[0])
             if self.uncommanded:
                 return
@@ -150,9 +162,9 @@ class LimbPart(Part):
         """Whether the limb must wait for the recorder."""
         return self.awaits_recorder and self.tick - self.recorded > RECORDER_LAG
 
-    def rows(self, data: bytes) -> FloatArray:
-        """Torque and slopes [2 + 2 n, n] of a message."""
-        parts = [self.values("joint_torque", data, name) for name in TORQUE_FIELDS]
+    def rows(self, topic: str, data: bytes) -> FloatArray:
+        """Torque and slopes [2 + 2 n, n] of a message of a topic."""
+        parts = [self.values(topic, data, name) for name in TORQUE_FIELDS]
         return np.concatenate(parts).reshape(-1, self.stepper.joints)
 
     def step_to_now(self) -> None:
@@ -225,9 +237,38 @@ class LimbPart(Part):
             self.history[self.tick] = self.stepper.angle.copy(), self.stepper.velocity.copy()
             if len(self.history) > REMEMBERED:
                 self.history.popitem(last=False)
-        self.stepper.step(rows, self.ticks.period)
-        self.tick += 1
+        self.go_to(self.stepper.step(rows, self.ticks.period))
+        self.meet_impacts()
+
+    def go_to(self, impact: Impact | None) -> None:
+        """Be at an impact within the tick, or at the next tick, and offer that."""
+        self.struck = impact
+        self.tick += impact is None
         self.offer()
+
+    def on_impact_torque(self, number: int, data: bytes) -> None:
+        """Take over the torque behind an impact; a node that is started anew gets those that it comes to later."""
+        if self.struck is None and not self.again:
+            self.conflicts += 1
+            self.refuse(f"impact_torque: a message is of impact {number}, which has not been")
+            return
+        self.impact_torques[number] = self.rows("impact_torque", data)
+        self.go_on()
+
+    def meet_impacts(self) -> None:
+        """Go on behind the impacts within the tick whose torques are there."""
+        while self.struck is not None and self.begun and self.impacts in self.impact_torques:
+            rows = self.impact_torques.pop(self.impacts)
+            self.impacts += 1
+            self.go_to(self.stepper.go_on(rows))
+
+    def send_impact(self, impact: Impact) -> None:
+        """Ask for the torque behind an impact."""
+        values = self.impact.values
+        values["of_tick"][...], values["time"][...] = self.tick, impact.time
+        values["angle"][:] = impact.angle
+        values["velocity_before"][:], values["velocity_after"][:] = impact.before, impact.after
+        self.impact.publish(self.impacts)
 
     def show(self, rows: FloatArray) -> None:
         """Send the movement pattern and joint_states of this tick, once."""
@@ -254,9 +295,13 @@ class LimbPart(Part):
             pattern = patterns[min(tick + 1, past.tick)]
             self.stepper.command[:] = self.values("movement_pattern", pattern, "command")
             self.stepper.load[:] = self.values("movement_pattern", pattern, "load")
-            self.stepper.step(self.rows(past.messages["joint_torque"][tick]), self.ticks.period)
-        self.tick = past.tick + 1
+            rows = self.rows("joint_torque", past.messages["joint_torque"][tick])
+            self.struck = self.stepper.step(rows, self.ticks.period)
+        self.tick = past.tick + (self.struck is None)
         self.again = True
+        self.impacts = past.impacts
+        if "impact_torque" in self.streams:
+            self.streams["impact_torque"].go_on_after(self.impacts - 1)
 
     def before_the_end(self) -> None:
         """What is to be said before the message with which the recording ends."""
@@ -264,6 +309,7 @@ class LimbPart(Part):
     def send_pattern(self, rows: FloatArray) -> None:
         """Send the movement of this tick under torque and slopes [4, n]."""
         values, shown, stepper = self.pattern.values, self.joint_states.values, self.stepper
+        values["impacts"][...] = self.impacts
         values["angle"][:], values["velocity"][:] = stepper.angle, stepper.velocity
         values["acceleration"][:] = stepper.acceleration(rows)
         values["torque"][:], values["command"][:], values["load"][:] = rows[0], stepper.command, stepper.load
@@ -282,6 +328,8 @@ class LimbPart(Part):
         """The torque of this tick, or the recorder."""
         if self.finished:
             return ""
+        if self.struck is not None and self.begun:
+            return f"the torque behind impact {self.impacts} within tick {self.tick} from muscle_stack"
         if self.pending and self.uncommanded:
             return f"joint_command of tick {self.tick} from a controller"
         if self.pending:

@@ -25,9 +25,11 @@ Input = tuple[FloatArray, FloatArray]
 class MusclePart(Part):
     """From activations and the limb's states to joint torques and the states of muscles.
 
-    tick: the newest that is answered. states: topics of states that are sent, every `state_every` ticks. waiting:
-    states of the limb that are not answered yet; a node that is started anew gets many before the first activation.
-    tell_ranges: called when a length of a muscle leaves its range for the first time, and before the last answer.
+    tick: the newest that is answered. states: topics of states that are sent, every `state_every` ticks.
+    waiting: states of the limb that are not answered yet, with how many impacts come before them; a node that is
+    started anew gets many before the first activation. struck: impacts that wait for answers. impacts: how many do not.
+    passed: which part of the tick the muscles have gone, 0 but for impacts. tell_ranges: called when a length of a
+    muscle leaves its range for the first time, and before the last answer.
     """
 
     def __init__(self, *given: Any, states: tuple[str, ...] = STATES, state_every: int = 1, **options: Any) -> None:
@@ -42,11 +44,16 @@ class MusclePart(Part):
         self.last_drive: FloatArray | None = None
         self.excitation: FloatArray = np.zeros(muscles)
         self.inputs: dict[int, Input] = {}
-        self.waiting: deque[tuple[int, FloatArray, FloatArray]] = deque()
+        self.waiting: deque[tuple[int, FloatArray, FloatArray, int]] = deque()
+        self.struck: deque[bytes] = deque()
+        self.impacts, self.passed = 0, 0.0
         self.torque, self.checkpoint = self.sends("joint_torque"), self.sends("muscle_checkpoint")
+        self.impact_torque = self.sends("impact_torque")
         self.states = [self.copied(topic) for topic in states]
         self.takes("activation", self.on_activation, gaps=self.realtime)
         self.takes("limb_state", self.on_limb_state, gaps=self.realtime)
+        if self.stepper.model.limited and not self.realtime:
+            self.takes("limb_impact", self.on_impact, gaps=False)
 
     def copied(self, topic: str) -> tuple[Outgoing, list[tuple[FloatArray, FloatArray]]]:
         """The messages of a topic of states, and pairs of target and source to copy into them."""
@@ -74,36 +81,73 @@ class MusclePart(Part):
         """Keep a state of the limb; in real time the ones before are answered first, with what is there."""
         if self.waiting and self.realtime:
             self.send(None)
-        self.waiting.append((tick, *self.limb_state("limb_state", data)))
+        self.waiting.append(
+            (tick, *self.limb_state("limb_state", data), self.forms["limb_state"].number(data, "impacts"))
+        )
+        self.answer()
+
+    def on_impact(self, number: int, data: bytes) -> None:
+        """Answer an impact, if it is one of the tick that was answered last; else keep it."""
+        self.struck.append(data)
         self.answer()
 
     def answer(self) -> None:
-        """Send the torques that are waited for, as far as their activations are there."""
+        """Send the torques that are waited for, as far as their activations and the impacts before them are there."""
+        self.answer_impacts()
         while self.waiting:
-            tick = self.waiting[0][0]
-            if tick not in self.inputs or not (tick == self.last_tick or tick + 1 in self.inputs):
+            tick, _, _, impacts = self.waiting[0]
+            known = tick in self.inputs and (tick == self.last_tick or tick + 1 in self.inputs)
+            if not known or impacts > self.impacts:
                 return
+            if impacts < self.impacts:
+                self.conflicts += 1
+                self.refuse(
+                    f"limb_impact: {self.impacts} impacts were told before tick {tick}, and there are {impacts}"
+                )
+                self.impacts = impacts
             self.send(self.inputs.get(tick + 1))
+            self.answer_impacts()
+
+    def answer_impacts(self) -> None:
+        """Send the torques behind the impacts of the tick that was answered last. Raises RunError."""
+        form = self.forms["limb_impact"]
+        while self.struck and form.number(self.struck[0], "of_tick") == self.tick:
+            data = self.struck.popleft()
+            angle, before, after = (
+                self.values("limb_impact", data, name).astype(np.float64)
+                for name in ("angle", "velocity_before", "velocity_after")
+            )
+            span = self.passed, float(self.values("limb_impact", data, "time")) / self.ticks.period
+            following = self.inputs[self.tick + 1][1]
+            given = self.drive, following, self.ticks.period, self.last_drive
+            self.stepper.advance((self.angle, self.velocity), (angle, before), *given, span)
+            self.angle, self.velocity, self.passed = angle, after, span[1]
+            rows = self.stepper.torque(angle, after, *given, (self.passed, 1.0))
+            self.write_torque(self.impact_torque, rows)
+            self.impact_torque.publish(self.impacts)
+            self.impacts += 1
+
+    def write_torque(self, messages: Outgoing, rows: FloatArray) -> None:
+        """Write torque and slopes into a message. Raises RunError if they are not finite."""
+        numbers, start = rows.reshape(-1), 0
+        if not finite(numbers):
+            why = self.stepper.fault() or "a slope of the torque is not a finite number"
+            raise RunError(f"{self.limb.file}: stops at {self.tick * self.ticks.period:g} s, tick {self.tick}: {why}")
+        for name in TORQUE_FIELDS:
+            target = messages.values[name]
+            target[:] = numbers[start : start + target.size]
+            start += target.size
 
     def send(self, following: Input | None) -> None:
         """Advance to the first tick that waits and send its torque and states. Raises RunError."""
-        tick, angle, velocity = self.waiting.popleft()
+        tick, angle, velocity, _ = self.waiting.popleft()
         excitation, drive = self.advance(tick, angle, velocity)
         next_drive = drive if following is None else following[1]
         rows = self.stepper.torque(angle, velocity, drive, next_drive, self.ticks.period, self.last_drive)
-        numbers = rows.reshape(-1)
-        if not finite(numbers):
-            why = self.stepper.fault() or "a slope of the torque is not a finite number"
-            raise RunError(f"{self.limb.file}: stops at {tick * self.ticks.period:g} s, tick {tick}: {why}")
+        self.write_torque(self.torque, rows)
         if self.stepper.look() or tick == self.last_tick:
             self.tell_ranges()
-        values = self.torque.values
-        start = 0
-        for name in TORQUE_FIELDS:
-            count = values[name].size
-            values[name][:] = numbers[start : start + count]
-            start += count
-        values["last_tick"][...] = self.last_tick
+        self.torque.values["last_tick"][...] = self.last_tick
         self.torque.publish(tick)
         # The limb waits for the torque; the states are for those who look on.
         if self.states and tick % self.state_every == 0:
@@ -131,7 +175,8 @@ class MusclePart(Part):
         if self.tick >= 0:
             period = (tick - self.tick) * self.ticks.period
             before, after = (self.angle, self.velocity), (angle, velocity)
-            self.stepper.advance(before, after, self.drive, drive, period, self.last_drive)
+            self.stepper.advance(before, after, self.drive, drive, period, self.last_drive, (self.passed, 1.0))
+            self.passed = 0.0
         self.last_drive = self.drive if tick == self.tick + 1 and self.tick >= 0 else None
         self.tick, self.angle, self.velocity, self.drive = tick, angle, velocity, drive
         return excitation, drive
@@ -158,8 +203,13 @@ class MusclePart(Part):
         for tick in range(self.tick + 1, past.tick + 1):
             for known in {tick, tick + 1} & activations.keys():
                 self.keep_activation(known, activations[known])
-            self.waiting.append((tick, *self.limb_state("movement_pattern", past.messages["movement_pattern"][tick])))
+            self.waiting.append(
+                (tick, *self.limb_state("movement_pattern", past.messages["movement_pattern"][tick]), 0)
+            )
             self.send(self.inputs.get(tick + 1))
+        self.impacts = past.impacts
+        if "limb_impact" in self.streams:
+            self.streams["limb_impact"].go_on_after(self.impacts - 1)
 
     @property
     def done(self) -> int:
@@ -172,5 +222,7 @@ class MusclePart(Part):
             return ""
         if not self.waiting:
             return f"limb_state of tick {self.tick + 1} from limb_dynamics"
-        tick = self.waiting[0][0]
+        tick, _, _, impacts = self.waiting[0]
+        if impacts > self.impacts:
+            return f"impact {self.impacts} within tick {self.tick} from limb_dynamics"
         return f"activation of tick {tick + (tick in self.inputs)} from activation_input"

@@ -6,9 +6,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from limb_nodes.bags.columns import MessageLayout
+from limb_nodes.bags.types import limb_typestore
 from limb_nodes.exchange.outgoing import stamp_of
 from limb_nodes.exchange.stream import CHECKPOINT
-from limb_nodes.foundation.topics import RECORDED, STATES
+from limb_nodes.foundation.topics import RECORDED, STATES, TOPIC_TYPES
 
 # Nobody waits for them: a lost message of a topic that is rarely sent is missed, and sent again, only after seconds.
 CHECKPOINTS = ("muscle_checkpoint", "limb_checkpoint")
@@ -21,13 +25,15 @@ class Past:
     """The last ticks of a run that are recorded.
 
     complete: the last tick that is there on every topic, -1 if none is. tick: from which a run goes on, the same or the
-    one before; the torque depends on the activation of the next tick, which must be there too. counts: topic ->
-    messages up to it. messages: topic -> tick -> message, in CDR, from the checkpoints on. muscles, limb: the newest
-    checkpoint of muscle_stack and of limb_dynamics, its tick and message; None for the start.
+    one before; the torque depends on the activation of the next tick, which must be there too. Between the checkpoints
+    and it no tick has an impact within, whose exchange is not recorded. impacts: how many come before it.
+    counts: topic -> messages up to it. messages: topic -> tick -> message, in CDR, from the checkpoints on.
+    muscles, limb: the newest checkpoint of muscle_stack and of limb_dynamics, its tick and message; None for the start.
     """
 
     complete: int = -1
     tick: int = -1
+    impacts: int = 0
     counts: dict[str, int] = field(default_factory=dict)
     messages: dict[str, dict[int, bytes]] = field(default_factory=lambda: {topic: {} for topic in NEEDED})
     muscles: tuple[int, bytes] | None = None
@@ -61,11 +67,34 @@ def past_of(recorded: Iterable[tuple[str, bytes]], every: Mapping[str, int], nan
             checkpoints[topic].append((tick, data))
             drop(past, checkpoints, every)
     past.complete, past.tick = complete(past.counts, every), answered(past.counts, every)
+    past.tick, past.impacts = before_impacts(past, checkpoints)
     for topic, step in every.items():
         past.counts[topic] = past.tick // step + 1
     newest = {name: [found for found in some if found[0] <= past.tick][-1:] for name, some in checkpoints.items()}
     past.muscles, past.limb = (next(iter(some), None) for some in newest.values())
     return past
+
+
+def before_impacts(past: Past, checkpoints: Mapping[str, list[tuple[int, bytes]]]) -> tuple[int, int]:
+    """The last tick that follows from checkpoints without an impact within a tick, and how many impacts came before."""
+    patterns = past.messages["movement_pattern"]
+    if past.tick < 0:
+        return past.tick, 0
+    layout = MessageLayout(patterns[past.tick], limb_typestore())
+    layout.message(TOPIC_TYPES["movement_pattern"], "")
+    if "impacts" not in layout.numbers:
+        # Recorded by a version without this exchange, which `take_up` refuses.
+        return past.tick, 0
+    at, kind, _ = layout.numbers["impacts"]
+
+    def impacts(tick: int) -> int:
+        return int(np.frombuffer(patterns[tick], kind, 1, at)[0])
+
+    first = min(([tick for tick, _ in some if tick <= past.tick] or [0])[-1] for some in checkpoints.values())
+    tick = past.tick
+    while tick > first and impacts(tick) > impacts(first):
+        tick -= 1
+    return tick, impacts(tick)
 
 
 def answered(counts: Mapping[str, int], every: Mapping[str, int]) -> int:

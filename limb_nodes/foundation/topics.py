@@ -10,6 +10,8 @@ TOPIC_TYPES: dict[str, str] = {
     "activation": "limb_msgs/msg/MuscleActivation",
     "limb_state": "limb_msgs/msg/LimbState",
     "joint_torque": "limb_msgs/msg/JointTorque",
+    "limb_impact": "limb_msgs/msg/LimbImpact",
+    "impact_torque": "limb_msgs/msg/JointTorque",
     "joint_states": "sensor_msgs/msg/JointState",
     "movement_pattern": "limb_msgs/msg/MovementPattern",
     "muscle_state": "limb_msgs/msg/MuscleState",
@@ -40,14 +42,19 @@ SENDERS = {
     "activation": "activation_input",
     "limb_state": "limb_dynamics",
     "joint_torque": "muscle_stack",
+    "limb_impact": "limb_dynamics",
+    "impact_torque": "muscle_stack",
     "movement_pattern": "limb_dynamics",
     **dict.fromkeys(STATES, "muscle_stack"),
     "muscle_checkpoint": "muscle_stack",
     "limb_checkpoint": "limb_dynamics",
 }
-"""Topic of a run, with a message for each tick or for every so many -> the node that sends it."""
+"""Topic of a run, with a message for each tick, for every so many or for each impact -> the node that sends it."""
 
-RECORDED = tuple(topic for topic in SENDERS if topic != "limb_state")
+IMPACTS = ("limb_impact", "impact_torque")
+"""Topics that have a message for each impact within a tick: what has struck, and the torque behind it."""
+
+RECORDED = tuple(topic for topic in SENDERS if topic not in ("limb_state", *IMPACTS))
 """Those that a bag holds; joint_states, which it holds too, is made of movement_pattern."""
 
 PUBLIC = tuple(topic for topic in RECORDED if not topic.endswith("_checkpoint"))

@@ -12,7 +12,7 @@ import numpy as np
 from numba import carray, njit, types
 
 from limb_nodes.solve.inner import inner
-from limb_nodes.solve.limits import NOTHING
+from limb_nodes.solve.limits import IMPACT, NOTHING
 from limb_nodes.solve.pointer import f8, i8, invoke, numbers_at, record_at
 from limb_nodes.solve.problem import (
     NEW_STATE,
@@ -30,7 +30,7 @@ from limb_nodes.solve.problem import (
 
 vector, table = f8[::1], f8[:, ::1]
 
-DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE, PAUSED = 0, 1, 2, 3, 4
+DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE, PAUSED, STRUCK = 0, 1, 2, 3, 4, 5
 # Steps per second of movement, at least for one second, after which the solver gives up.
 MOST_STEPS = 1e6
 
@@ -79,6 +79,15 @@ def growth(error, last_error, method):
 
 
 @inner
+def jolted(before, after, joints):
+    """By how much an impact has changed the velocity of a joint, at most (rad/s)."""
+    most = 0.0
+    for j in range(joints, 2 * joints):
+        most = max(most, abs(after[j] - before[j]))
+    return most
+
+
+@inner
 def fill(t, h, row, times, out, method, work, problem):
     """Fill out [times, states] from `row` on with the states at times within a step; the row behind them."""
     first = row
@@ -98,6 +107,8 @@ def fill(t, h, row, times, out, method, work, problem):
 def integrate(method_, problem_, control_, stops, scale, y, times, out):
     """Advance y [states] in place from `control.start`, or where it paused, to `control.end`; a status.
 
+    STRUCK behind an impact at `control.time` that has jolted a joint by more than `control.jolt`.
+
     method_, problem_, control_: addresses of the records.
     stops: times (rising) that no step may cross: kinks of the input. scale: typical sizes of the states.
     times, out: rising times within, and the states there [times, states]. A solve that paused goes on with the times
@@ -111,6 +122,7 @@ def integrate(method_, problem_, control_, stops, scale, y, times, out):
     copy(y, state)
     copy(scale, work[SCALE])
     rest = carray(numbers_at(control.rest), (problem.states,))
+    struck = carray(numbers_at(control.struck), (problem.states,))
     row, stop = 0, 0
     fresh = False
     if control.paused:
@@ -171,8 +183,14 @@ def integrate(method_, problem_, control_, stops, scale, y, times, out):
         control.steps += 1
         fresh = False
         if event:
+            watched = control.jolt > 0.0 and control.event == IMPACT
+            if watched:
+                copy(state, struck)
             invoke(method.take_effect, t, method, work, control, problem)
             h = max(h, 0.1 * wanted)
+            if watched and jolted(struck, state, problem.joints) > control.jolt:
+                status = STRUCK
+                break
         else:
             h *= growth(error, last_error, method)
             last_error = max(error, 1e-4)

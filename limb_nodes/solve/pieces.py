@@ -48,6 +48,20 @@ def bent(earlier, before, after):
     return piece
 
 
+@njit(cache=True)
+def part_of(piece, start, end):
+    """A part of an interval [1, 4 n], as one of its own; start, end: shares of the interval."""
+    part = np.empty_like(piece)
+    width = end - start
+    for i in range(0, piece.shape[1], 4):
+        c0, c1, c2, c3 = piece[0, i], piece[0, i + 1], piece[0, i + 2], piece[0, i + 3]
+        part[0, i] = c0 + start * (c1 + start * (c2 + start * c3))
+        part[0, i + 1] = width * (c1 + start * (2.0 * c2 + 3.0 * start * c3))
+        part[0, i + 2] = width * width * (c2 + 3.0 * start * c3)
+        part[0, i + 3] = width * width * width * c3
+    return part
+
+
 def corners(samples: FloatArray) -> BoolArray:
     """Whether each sample [T, n] is a corner [T, n]."""
     count, width = samples.shape

@@ -43,6 +43,8 @@ METHOD = whole_numbers("step", "between", "tableau", "stages", "implicit", "sett
 # Given: start, end: s. tolerance: of a step's error, relative to a state's size. longest: greatest step (s).
 # pause: time (s) at or behind which the solve pauses, at the end of a step; rest: address of the rates [states] that a
 # paused solve goes on with, 0 if it is never to pause.
+# jolt: the change of a velocity (rad/s) above which the solve ends behind an impact, 0 if it is never to; struck:
+# address of the state [states] before that impact, 0 likewise.
 # Given and told: next_step: size of the step that comes next (s), chosen by the integrator if 0. paused: whether the
 # solve goes on where it paused.
 # Told: time: reached (s). rows: how many of the wanted times were reached. error: of the last step over its tolerance;
@@ -50,9 +52,9 @@ METHOD = whole_numbers("step", "between", "tableau", "stages", "implicit", "sett
 # quiet_until: until then no joint is released (s).
 CONTROL = np.dtype(
     [
-        *((name, np.float64) for name in ("start", "end", "tolerance", "longest", "pause")),
+        *((name, np.float64) for name in ("start", "end", "tolerance", "longest", "pause", "jolt")),
         *((name, np.float64) for name in ("next_step", "time", "error", "last_error", "quiet_until")),
-        *((name, np.int64) for name in ("steps", "rejected", "event", "joint", "rest", "paused", "rows")),
+        *((name, np.int64) for name in ("steps", "rejected", "event", "joint", "rest", "paused", "rows", "struck")),
     ]
 )
 

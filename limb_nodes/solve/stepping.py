@@ -9,6 +9,8 @@ along into the next tick.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from limb_nodes.foundation.arrays import FloatArray
@@ -17,15 +19,21 @@ from limb_nodes.model.limb import Limb
 from limb_nodes.solve.explicit import EXPLICIT
 from limb_nodes.solve.failure import FAILURES, SolveError, fault_of
 from limb_nodes.solve.held import hold, predict
-from limb_nodes.solve.integrate import DONE, integrate
+from limb_nodes.solve.integrate import DONE, STRUCK, integrate
 from limb_nodes.solve.outputs import CROSSING_OUTPUTS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
-from limb_nodes.solve.pieces import bent, straight
+from limb_nodes.solve.pieces import bent, part_of, straight
 from limb_nodes.solve.problem import CONTROL, give_inputs, new_problem
 from limb_nodes.solve.ranges import Ranges
 from limb_nodes.solve.small import same
 from limb_nodes.solve.whole import WholeModel
 
 TICK_TOLERANCE = 1e-9
+# An impact that changes a joint's velocity by more than this (rad/s) asks for the torque behind it: what the linear
+# model of the torque misses there grows with the square of the change.
+JOLT = 1e-2
+WHOLE = (0.0, 1.0)
+# The part of a tick that is left at least behind an impact: slopes in time are per the rest of the tick.
+LEAST_REST = 1e-9
 NO_TIMES = np.empty(0)
 NO_ROWS = np.empty((0, 0))
 # A tick of the rehearsal (s).
@@ -132,19 +140,20 @@ class MuscleStepper:
         next_drive: FloatArray,
         period: float,
         last_drive: FloatArray | None = None,
+        span: tuple[float, float] = WHOLE,
     ) -> FloatArray:
         """Torque (N m), its slope in time, in the angles and in the velocities: 1, 1, n and n rows of [2 + 2 n, n].
 
         drive, next_drive: at this tick and one `period` (s) later. last_drive: one period before,
-        if it is known; the input is then a parabola instead of a straight line.
+        if it is known; the input is then a parabola instead of a straight line. span: the part of the tick at whose
+        start the torque is asked for.
         """
         self._set_state(angle, velocity)
-        self._data.period[0] = period
+        self._data.period[0] = period * (span[1] - span[0])
         out = np.empty((2 + 2 * self.joints, self.joints))
         model = self.model
-        model.program.torque_slopes(
-            self._state, tick_input(last_drive, drive, next_drive), model.layout.model.address, self._data.address, out
-        )
+        inputs = tick_input(last_drive, drive, next_drive, span)
+        model.program.torque_slopes(self._state, inputs, model.layout.model.address, self._data.address, out)
         return out
 
     def _set_state(self, angle: FloatArray, velocity: FloatArray) -> None:
@@ -161,21 +170,22 @@ class MuscleStepper:
         next_drive: FloatArray,
         period: float,
         last_drive: FloatArray | None = None,
+        span: tuple[float, float] = WHOLE,
     ) -> None:
-        """Advance the internal states over one `period` (s).
+        """Advance the internal states over one tick, as long as `period` (s), or over a part of it.
 
-        before, after: joint angles and velocities at its ends; drives as for `torque` at its start.
-        Raises SolveError.
+        before, after: joint angles and velocities at the ends of the part; drives as for `torque` at the tick's start.
+        span: the part. Raises SolveError.
         """
         if self.internal.size == 0:
             return
-        data = self._data
+        data, period = self._data, period * (span[1] - span[0])
         data.period[0] = period
         (data.angles_before[:], data.velocities_before[:]), (data.angles_after[:], data.velocities_after[:]) = (
             before,
             after,
         )
-        inputs = tick_input(last_drive, drive, next_drive)
+        inputs = tick_input(last_drive, drive, next_drive, span)
         give_inputs(self._problem, inputs)
         scale = self.model.layout.state_scales
         status = solve_tick(EXPLICIT.free, self._problem, self._control, scale, self.internal, period)
@@ -202,14 +212,27 @@ class MuscleStepper:
         return fault_of(self.model, self._state, self._data, np.zeros_like(self._data.scratch))
 
 
+class Impact(NamedTuple):
+    """What has struck a limb within a tick: joints that have reached the ends of their ranges.
+
+    time: since the tick's start (s). angle: of the joints (rad) [n]. before, after: their velocities (rad/s) [n].
+    """
+
+    time: float
+    angle: FloatArray
+    before: FloatArray
+    after: FloatArray
+
+
 class LimbStepper:
     """The chain of segments under torques with slopes.
 
-    angle, velocity: of the joints [n] at the current tick. load: tip force x, y (N), tip torque
-    (N m). command: torque on the joints [n] beside that of the muscles, the same during a tick (N m).
+    asks: whether a step ends behind an impact, to ask for the torque there. angle, velocity: of the joints [n] at the
+    current tick. load: tip force x, y (N), tip torque (N m). command: torque on the joints [n] beside that of the
+    muscles, the same during a tick (N m).
     """
 
-    def __init__(self, limb: Limb) -> None:
+    def __init__(self, limb: Limb, asks: bool = False) -> None:
         self.model = WholeModel(limb)
         self.joints = n = self.model.layout.joints
         state = self.model.initial_state()[: 2 * n]
@@ -218,11 +241,16 @@ class LimbStepper:
         self._rates = np.empty(2 * n)
         self.command = np.zeros(n)
         self._control = tick_control()
+        self._struck = np.empty(2 * n)
+        self._control.struck[0] = self._struck.ctypes.data
+        # How far into the tick the limb is (s), and what holds until its end.
+        self._passed = self._period = 0.0
         # What the last step expects of the next torque; empty if it says nothing.
         self._expected: FloatArray = np.empty(n)
         self._predicted = NO_TIMES
         self._start()
         self._rehearse(state)
+        self._control.jolt[0] = JOLT if asks else 0.0
 
     def _start(self) -> None:
         """Fresh data, and the chain alone as a problem of it."""
@@ -281,24 +309,42 @@ class LimbStepper:
         model.program.limb_rates(0.0, self._state, NO_ROWS, model.layout.model.address, data.address, self._rates)
         return self._rates[self.joints :].copy()
 
-    def step(self, torque: FloatArray, period: float) -> None:
-        """Advance by `period` (s) under torque and slopes [2 + 2 n, n]. Raises SolveError."""
-        data = self._data
+    def step(self, torque: FloatArray, period: float) -> Impact | None:
+        """Advance by `period` (s) under torque and slopes [2 + 2 n, n], or until an impact if the stepper asks.
+
+        `go_on` must follow then. Raises SolveError.
+        """
         predicted = self._predicted + self.command if self._predicted.size else self._predicted
-        hold(self._commanded(torque), self._state, predicted, period, data.held)
+        self._passed, self._period = 0.0, period
+        return self._advance(torque, predicted)
+
+    def go_on(self, torque: FloatArray) -> Impact | None:
+        """Go on behind an impact, under the torque and slopes there, until the tick's end or the next impact."""
+        return self._advance(torque, NO_TIMES)
+
+    def _advance(self, torque: FloatArray, predicted: FloatArray) -> Impact | None:
+        """The rest of a tick."""
+        data, n = self._data, self.joints
+        rest = self._period - self._passed
+        hold(self._commanded(torque), self._state, predicted, rest, data.held)
         before = data.locked.copy()
         how = EXPLICIT.limited if self.model.limited else EXPLICIT.free
-        status = solve_tick(how, self._problem, self._control, self._scale, self._state, period)
+        status = solve_tick(how, self._problem, self._control, self._scale, self._state, rest)
+        if status == STRUCK:
+            self._predicted = NO_TIMES
+            self._passed = min(self._passed + float(self._control.time[0]), self._period * (1.0 - LEAST_REST))
+            return Impact(self._passed, self.angle.copy(), self._struck[n:].copy(), self.velocity.copy())
         if status != DONE:
             raise SolveError(f"{self.model.limb.file}: the limb cannot be advanced: {FAILURES[status]}")
         # An impact bends the torque at once, which tells nothing about the tick that follows.
-        if same(data.locked, before):
-            predict(data.held, self._state, period, self._expected)
+        if same(data.locked, before) and not self._passed:
+            predict(data.held, self._state, rest, self._expected)
             # What is expected is of the muscles alone: a command may change at any tick.
             self._expected -= self.command
             self._predicted = self._expected
         else:
             self._predicted = NO_TIMES
+        return None
 
     def _commanded(self, torque: FloatArray) -> FloatArray:
         """Rows of torque [2 + 2 n, n] of muscles and command."""
@@ -307,7 +353,9 @@ class LimbStepper:
         return both
 
 
-def tick_input(last_drive: FloatArray | None, drive: FloatArray, next_drive: FloatArray) -> FloatArray:
-    """The input over one tick."""
+def tick_input(
+    last_drive: FloatArray | None, drive: FloatArray, next_drive: FloatArray, span: tuple[float, float]
+) -> FloatArray:
+    """The input over one tick, or over a part of it."""
     piece: FloatArray = straight(drive, next_drive) if last_drive is None else bent(last_drive, drive, next_drive)
-    return piece
+    return piece if span == WHOLE else np.asarray(part_of(piece, *span))

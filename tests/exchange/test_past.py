@@ -89,7 +89,9 @@ def test_a_run_goes_on_where_it_was_cut_short(file):
     for tick in CUTS:
         recorded = cut(whole, tick)
         past = past_of(recorded, EVERY, TICKS.nanoseconds)
-        assert past.tick == tick - 1
+        struck = [data for topic, data in recorded if topic == "limb_impact"]
+        # Behind a tick with an impact within, only from the next checkpoint on.
+        assert past.tick == tick - 1 or len(struck) > past.impacts
         assert len(past.messages["joint_torque"]) <= 2 * CHECKPOINT
         rest = by_topic(run(limb, past))
         for topic, messages in by_topic(whole).items():

@@ -5,12 +5,29 @@ from __future__ import annotations
 import pytest
 
 from limb_nodes.exchange.part import Part
+from limb_nodes.exchange.ticks import Ticks
+from limb_nodes.model import parse_limb
 from tests.faults import schedules
-from tests.faults.simulated import RESPAWN, Fault, Run, Schedule
+from tests.faults.simulated import RESPAWN, Fault, Run, Schedule, Setting
+from tests.independent.random_limb import RandomLimb
 
 
 def test_a_few_schedules_do_no_harm():
     bad = [trial for trial in schedules.trials(150, 1) if not trial.good]
+    assert bad == []
+
+
+def test_a_few_schedules_with_impacts_within_ticks_do_no_harm(monkeypatch):
+    """Twelve impacts in 30 ticks: the exchange behind them is lost, late, doubled, forged, or its nodes killed."""
+    other = RandomLimb(0)
+    excitation = other.excitation(50.0, 0.6)[: schedules.FINAL + 1]
+    given = Setting(parse_limb(other.yaml(), "random.yaml"), excitation, ticks=Ticks(50.0))
+    monkeypatch.setattr(schedules, "setting", lambda: given)
+    schedules.undisturbed.cache_clear()
+    calm = Run(given, Schedule(seed=0)).go()
+    assert max(getattr(process.part, "impacts", 0) for process in calm.everyone) == 12
+    bad = [trial for trial in schedules.trials(60, 1) if not trial.good]
+    schedules.undisturbed.cache_clear()
     assert bad == []
 
 

@@ -36,6 +36,8 @@ READERS = {
     "activation": ("muscle_stack", "recorder"),
     "limb_state": ("activation_input", "muscle_stack"),
     "joint_torque": ("limb_dynamics", "recorder"),
+    "limb_impact": ("muscle_stack",),
+    "impact_torque": ("limb_dynamics",),
     "movement_pattern": ("recorder",),
     "muscle_state": ("recorder",),
     "motor_unit_state": ("recorder",),

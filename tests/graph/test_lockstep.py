@@ -18,6 +18,7 @@ from limb_nodes.nodes.settings import RunSettings, checked
 from limb_nodes.signals.activation import load_activation
 from limb_nodes.solve.stepping import LimbStepper, MuscleStepper
 from limb_nodes.solve.whole import WholeModel
+from tests.independent.random_limb import RandomLimb
 
 NODES = ("activation_input", "muscle_stack", "limb_dynamics", "recorder")
 TICKS, RATE, PERIOD_NS = 501, 1000.0, 1_000_000
@@ -81,6 +82,28 @@ def test_muscles_over_two_joints_in_one_process_and_in_four(bags, tmp_path, own_
     np.testing.assert_allclose(state["torque"][:, on_knee].sum(axis=1), torque["torque"][:, 1], rtol=1e-9, atol=1e-9)
     assert main(["rerun", str(tmp_path / "one"), "--out", str(tmp_path / "again")]) == 0
     assert bags.differences(tmp_path / "one", tmp_path / "again") == []
+
+
+def test_impacts_within_ticks_in_one_process_and_in_four(bags, tmp_path, own_signals):
+    """A limb of five joints that meets the ends of its ranges: equal values, and those of the whole model."""
+    other = RandomLimb(0)
+    file = tmp_path / "limb.yaml"
+    file.write_text(other.yaml())
+    model = load_limb(file)
+    constant = ",".join(f"{name}=0.9" for name in model.muscle_names)
+    one, four = (
+        checked(RunSettings(str(file), constant, 200.0, 0.6, str(tmp_path / name)))[0] for name in ("one", "four")
+    )
+    run_in_one_process(one, lambda tick: None)
+    run_in_processes(four, lambda tick: None)
+    assert bags.differences(tmp_path / "one", tmp_path / "four") == []
+    with BagReader(tmp_path / "one") as bag:
+        pattern = bag.table("movement_pattern")
+        assert not any("impact" in topic for topic in bag.topics)
+    assert pattern["impacts"][-1] > 3
+    excitation = np.full((121, len(model.muscles)), 0.9)
+    whole = WholeModel(model).simulate(excitation, 200.0, observe=False)
+    assert np.abs(whole.angle - pattern["angle"]).max() < 5e-4
 
 
 @pytest.mark.parametrize(

@@ -197,9 +197,9 @@ def torques_carried(path: Path, limb: str, rate: float, bags: Any) -> int:
         for old in range(max(0, k + 1 - len(rows)), min(k + 1, round(MOST_AHEAD * rate))):
             torque = rows[k - old].copy()
             torque[0] += (
-                torque[1] * (angle[k] - angle[k - old])
-                + torque[2] * (velocity[k] - velocity[k - old])
-                + torque[3] * old * period
+                torque[2] * (angle[k] - angle[k - old])
+                + torque[3] * (velocity[k] - velocity[k - old])
+                + torque[1] * old * period
             )
             if not np.array_equal(chain.acceleration(torque), acceleration):
                 continue
