@@ -25,6 +25,7 @@ from typing import Any
 from limb_nodes import cli, commands
 from limb_nodes.levels import CONTRACTS, REGISTRY, Law, Parameter, motor_unit, sarcomere
 from limb_nodes.model import load
+from limb_nodes.model.report_laws import is_of_report
 from limb_nodes.model.spanning import READERS
 from limb_nodes.signals.waveform import WAVES
 
@@ -176,7 +177,7 @@ def law_section(name: str, law: Law) -> str:
     ]
     parts = [
         f"### {law.process}: {name}",
-        f"Source: {law.source or '-'}.",
+        f"Source: {law.source or '-'}." + ("" if is_of_report(law) else " Not the report's."),
         table(("equation", "defines", "meaning", "uses"), rows),
     ]
     if law.states:

@@ -50,6 +50,7 @@ def add_parser(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the cases, print, draw; 1 if a quantity is not as expected."""
     from limb_nodes.analysis.verification import CASES, measure
+    from limb_nodes.model.report_laws import other_laws
 
     cases = chosen(args.case, CASES)
     folder = Path(args.limbs) if args.limbs else None
@@ -75,6 +76,8 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps([finding.plain() for finding in findings], indent=1))
     else:
         print(table(cases, ways, findings))
+        others = sorted({law for limb in limbs.values() for law in other_laws(limb)})
+        print(f"laws that are not the report's: {', '.join(others) or 'none'}")
         if pictures:
             print(f"\nfigures: {pictures}")
     return 0 if all(finding.passed for finding in findings) else 1
