@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.polynomial import polynomial
+from scipy.integrate import simpson
 
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.yaml_text import yaml_text
@@ -359,3 +360,62 @@ def test_numbers_of_paths_can_be_changed(leg, values, excitation):
     unchanged = WholeModel(leg)
     same = unchanged.right_hand_side(pieces(unchanged.drives(excitation[:1])), 1.0)(0.0, unchanged.initial_state())
     assert np.abs(rates[0] - same).max() > 1e-3
+
+
+STIFFNESS = {"hip": 20.0, "knee": 20.0, "ankle": 20.0}
+REST = {"hip": 0.3, "knee": -0.6, "ankle": 1.5}
+
+
+def energy(limb, angle: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """Kinetic energy, that in gravity and in the springs of the joints (J) [T]: segments hang in the complex plane."""
+    turned, speed = limb.base_angle + np.cumsum(angle, axis=1), np.cumsum(velocity, axis=1)
+    along = np.exp(1j * turned)
+    place = moves = np.zeros(len(angle), dtype=complex)
+    total = np.zeros(len(angle))
+    for k, segment in enumerate(limb.segments):
+        com = place + segment.com_distance * along[:, k]
+        com_moves = moves + segment.com_distance * 1j * along[:, k] * speed[:, k]
+        total += segment.mass * (0.5 * np.abs(com_moves) ** 2 + 9.81 * com.imag)
+        total += 0.5 * segment.inertia * speed[:, k] ** 2
+        total += 0.5 * STIFFNESS[segment.joint] * (angle[:, k] - REST[segment.joint]) ** 2
+        place, moves = place + segment.length * along[:, k], moves + segment.length * 1j * along[:, k] * speed[:, k]
+    return total
+
+
+def by_ticks(limb, excitation: np.ndarray, rate: float):
+    """Angles and velocities [T, n] of a run by ticks, and the forces and velocities of its muscles [T, muscles]."""
+    muscles, chain = MuscleStepper(limb), LimbStepper(limb)
+    period, earlier = 1.0 / rate, None
+    angle, velocity, force, shortening = [], [], [], []
+    for row, following_row in zip(excitation, [*excitation[1:], excitation[-1]], strict=True):
+        here = chain.angle.copy(), chain.velocity.copy()
+        muscles.observe(*here, row)
+        shown = muscles.shown
+        values = *here, shown["muscle_force"], shown["muscle_tendon_velocity"]
+        for seen, value in zip((angle, velocity, force, shortening), values, strict=True):
+            seen.append(value.copy())
+        drive, following = muscles.drive(row), muscles.drive(following_row)
+        chain.step(muscles.torque(*here, drive, following, period, earlier), period)
+        muscles.advance(here, (chain.angle.copy(), chain.velocity.copy()), drive, following, period, earlier)
+        earlier = drive
+    return tuple(map(np.array, (angle, velocity, force, shortening)))
+
+
+@pytest.mark.parametrize("way", ["whole", "ticks"])
+def test_the_work_of_muscles_is_the_change_of_energy(leg, way):
+    rate = 4000.0
+    time, phase = np.arange(4001) / rate, np.arange(10)
+    excitation = 0.325 + 0.275 * np.sin(2 * np.pi * np.outer(time, 0.5 + 0.1 * phase) + phase)
+    if way == "whole":
+        found = WholeModel(leg).simulate(excitation, rate)
+        angle, velocity = found.angle, found.velocity
+        force, shortening = (found.muscle[name] for name in ("muscle_force", "muscle_tendon_velocity"))
+    else:
+        angle, velocity, force, shortening = by_ticks(leg, excitation, rate)
+    damped = (np.array([DAMPING[name] for name in leg.joint_names]) * velocity**2).sum(axis=1)
+    power = (force * shortening).sum(axis=1)
+    work, lost = simpson(power, x=time), simpson(damped, x=time)
+    stored = energy(leg, angle, velocity)
+    exchanged = simpson(np.abs(force * shortening).sum(axis=1), x=time)
+    assert exchanged > 1.0
+    assert abs(stored[-1] - stored[0] + lost - work) < 1e-6 * exchanged
