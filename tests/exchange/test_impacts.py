@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections import deque
 from functools import cache
 
 import numpy as np
 import pytest
 
-from limb_nodes.exchange.activations import ActivationPart
 from limb_nodes.exchange.movement import LimbPart
 from limb_nodes.exchange.muscles import MusclePart
 from limb_nodes.exchange.past import Past, expected_topics, past_of
 from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.model import parse_limb
 from limb_nodes.solve.whole import WholeModel
+from tests.exchange.parts import IDENTITY, cut, run_parts
 from tests.independent.random_limb import RandomLimb
 
 SECONDS = 0.6
-IDENTITY = "0123456789abcdef" * 2
 EVERY = expected_topics({})
 # With several impacts each: 5, 4, 5, 3 and 5 joints.
 SEEDS = (0, 5, 7, 6, 13)
@@ -29,33 +27,8 @@ def limb_of(seed: int):
     return parse_limb(RandomLimb(seed).yaml(), "random.yaml")
 
 
-def run(seed: int, rate: float, past: Past | None = None, realtime: bool = False):
-    """The messages of a run, or of what follows a past, in the order in which they are sent."""
-    excitation = RandomLimb(seed).excitation(rate, SECONDS)
-    common = {"limb": limb_of(seed), "ticks": Ticks(rate), "identity": IDENTITY}
-    activations = ActivationPart(**common, values_at=lambda tick: excitation[tick], final=len(excitation) - 1)
-    parts = [activations, MusclePart(**common), dynamics := LimbPart(**common)]
-    sent: list[tuple[str, bytes]] = []
-    waiting: deque[tuple[str, bytes]] = deque()
-    for part in parts:
-        for topic, messages in part.outgoing.items():
-
-            def send(data: bytes, topic: str = topic) -> None:
-                sent.append((topic, data))
-                waiting.append((topic, data))
-
-            messages.send = send
-        if past is not None:
-            part.take_up(past)
-    dynamics.begin()
-    while waiting:
-        topic, data = waiting.popleft()
-        for part in parts:
-            if topic in part.streams:
-                part.receive(topic, data)
-    assert all(part.finished and not part.awaited() for part in parts)
-    assert sum(part.bad_input + part.foreign + part.conflicts for part in parts) == 0
-    return sent, dynamics
+def run(seed: int, rate: float, past: Past | None = None):
+    return run_parts(limb_of(seed), RandomLimb(seed).excitation(rate, SECONDS), Ticks(rate), past)
 
 
 @cache
@@ -99,12 +72,6 @@ def test_an_impact_tells_when_and_how_it_jolts_the_joints():
         ]
         stopped = [where and was != 0.0 and now_ == 0.0 for where, was, now_ in zip(on_end, old, new, strict=True)]
         assert any(stopped)
-
-
-def cut(messages, tick: int):
-    """The messages until that with which the torque of a tick would come."""
-    torques = [k for k, (topic, _) in enumerate(messages) if topic == "joint_torque"]
-    return messages[: torques[tick]]
 
 
 @pytest.mark.parametrize("seed", SEEDS[:3])

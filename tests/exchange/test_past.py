@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from functools import cache
 from pathlib import Path
 
@@ -10,61 +9,29 @@ import numpy as np
 import pytest
 
 from limb_nodes.errors import UserError
-from limb_nodes.exchange.activations import ActivationPart
-from limb_nodes.exchange.movement import LimbPart
-from limb_nodes.exchange.muscles import MusclePart
 from limb_nodes.exchange.past import Past, expected_topics, past_of
 from limb_nodes.exchange.recorded import RecordedRun, join_parts
 from limb_nodes.exchange.stream import CHECKPOINT
 from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.model import load_limb
 from limb_nodes.model.limb import Limb
+from tests.exchange.parts import Message, cut, run_parts
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMBS = [*sorted((ROOT / "params").glob("*_joint*.yaml")), ROOT / "params/pennate_leg.yaml"]
 ALTERNATIVES = ROOT / "tests/levels/alternatives.yaml"
 TWO_JOINTS = ROOT / "tests/levels/two_joint_leg.yaml"
-IDENTITY = "0123456789abcdef" * 2
 TICKS = Ticks(500.0)
 FINAL = 3 * CHECKPOINT
 EVERY = expected_topics({"state_every": 3})
 # Ticks at which a run is cut short: the first, before, at and behind a checkpoint, between two, before the last.
 CUTS = [0, 1, CHECKPOINT - 1, CHECKPOINT, CHECKPOINT + 1, 2 * CHECKPOINT + 50, FINAL - 1]
 
-Message = tuple[str, bytes]
-
 
 def run(limb: Limb, past: Past | None = None) -> list[Message]:
-    """The messages of a run, or of what follows a past, in the order in which they are sent."""
+    """The messages of a run, or of what follows a past."""
     phase = 0.03 * np.arange(FINAL + 1)[:, np.newaxis] + np.arange(len(limb.muscles))
-    activations = 0.5 + 0.5 * np.sin(phase)
-    common = {"limb": limb, "ticks": TICKS, "identity": IDENTITY}
-    parts = [
-        ActivationPart(**common, values_at=lambda tick: activations[tick], final=FINAL),
-        MusclePart(**common, state_every=3),
-        dynamics := LimbPart(**common),
-    ]
-    sent: list[Message] = []
-    waiting: deque[Message] = deque()
-    for part in parts:
-        for topic, messages in part.outgoing.items():
-
-            def send(data: bytes, topic: str = topic) -> None:
-                sent.append((topic, data))
-                waiting.append((topic, data))
-
-            messages.send = send
-        if past is not None:
-            part.take_up(past)
-    dynamics.begin()
-    while waiting:
-        topic, data = waiting.popleft()
-        for part in parts:
-            if topic in part.streams:
-                part.receive(topic, data)
-    assert all(part.finished for part in parts)
-    assert sum(part.bad_input + part.foreign for part in parts) == 0
-    return sent
+    return run_parts(limb, 0.5 + 0.5 * np.sin(phase), TICKS, past, state_every=3)[0]
 
 
 def by_topic(messages: list[Message]) -> dict[str, list[bytes]]:
@@ -75,12 +42,6 @@ def by_topic(messages: list[Message]) -> dict[str, list[bytes]]:
 def undisturbed(file: Path) -> tuple[Limb, list[Message]]:
     limb = load_limb(file)
     return limb, run(limb)
-
-
-def cut(messages: list[Message], tick: int) -> list[Message]:
-    """The messages until that with which the torque of a tick would come."""
-    torques = [k for k, (topic, _) in enumerate(messages) if topic == "joint_torque"]
-    return messages[: torques[tick]]
 
 
 @pytest.mark.parametrize("file", [*LIMBS, ALTERNATIVES, TWO_JOINTS], ids=lambda path: path.stem)
