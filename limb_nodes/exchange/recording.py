@@ -17,7 +17,8 @@ class RecordingPart(Part):
     """Takes each tick of each topic once.
 
     expected: topic -> every how many ticks it should have a message. counts: topic -> messages taken. last_tick: of the
-    run, -1 while it is not known. ready: whether all other nodes are known to be there.
+    run, -1 while it is not known. ready: whether all other nodes are known to be there. unknown: nodes whose parameters
+    the bag waits for.
     """
 
     def __init__(self, *given: Any, **options: Any) -> None:
@@ -26,6 +27,7 @@ class RecordingPart(Part):
         self.counts = dict.fromkeys(RECORDED, 0)
         self.last_tick = -1
         self.ready = False
+        self.unknown: list[str] = []
         self._new: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in RECORDED}
         self._joint_states = Outgoing(joint_states_form(self.limb), self.ticks.nanoseconds)
         for topic in RECORDED:
@@ -110,6 +112,8 @@ class RecordingPart(Part):
         """What is missing of the next tick."""
         if self.finished:
             return ""
+        if self.unknown:
+            return f"the parameters of {', '.join(self.unknown)}"
         tick = self.complete + 1
         topic = next(topic for topic, every in self.awaited_topics if self.newest(topic) + every - 1 < tick)
         return f"{topic} of tick {tick} from {SENDERS[topic]}"

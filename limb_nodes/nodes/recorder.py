@@ -152,13 +152,21 @@ class Recorder(LimbNode):
             if now - self.asked.get(name, -math.inf) > ASK_AGAIN and client.services_are_ready():
                 self.asked[name] = now
                 client.list_parameters(callback=partial(self.on_names, name, client))
+        self.part.unknown = [name for name in NODES if name not in self.parameters]
         waited = self.first_message is not None and now - self.first_message > PATIENCE
         if set(self.parameters) >= set(NODES) or waited:
             self.asking.cancel()
+            self.part.unknown = []
             try:
                 self.open()
             except UserError as error:
                 self.fail(error)
+
+    def on_look(self) -> None:
+        """Also say again that the run may start, until it does: whoever has missed it would wait for ever."""
+        super().on_look()
+        if self.announced == -1 and self.first_message is None:
+            self.progress.publish(Recorded(run=self.part.identity, tick=self.announced))
 
     def on_names(self, node: str, client: AsyncParameterClient, future: Any) -> None:
         """Ask for the values of a node's parameters."""
