@@ -83,8 +83,9 @@ def test_what_was_said_when_the_run_ends_is_in_its_bag(limb, waves, bench, until
     graph.finish(recorder)
     with BagReader(tmp_path / "run") as bag:
         names = [status.name for _, message in bag.read_topic("/diagnostics") for status in message.status]
-    assert names == ["/limb_dynamics"] * (len(names) - 1) + ["last words"]
-    assert len(names) > 1
+    # Every second all nodes tell how they do; a busy machine may take so long.
+    assert names[-1] == "last words"
+    assert "/limb_dynamics" in names
 
 
 @pytest.mark.parametrize("rate", [50.0, 200.0])
