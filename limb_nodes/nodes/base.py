@@ -23,11 +23,11 @@ from limb_nodes.exchange.identity import FORM, is_identity
 from limb_nodes.exchange.part import Part
 from limb_nodes.exchange.recorded import RecordedRun
 from limb_nodes.exchange.ticks import HIGHEST_RATE, LOWEST_RATE, Ticks
-from limb_nodes.exchange.watch import LOOK_PERIOD, STALL, STALL_LIMIT, Watch
+from limb_nodes.exchange.watch import LOOK_PERIOD, SOON, STALL, STALL_LIMIT, Watch
 from limb_nodes.foundation.topics import PUBLIC, exchanged
 from limb_nodes.model import Limb, load_limb
 from limb_nodes.nodes.claims import check_claim
-from limb_nodes.nodes.distribution import given_parameters, parameter_values
+from limb_nodes.nodes.distribution import given_parameters, parameter_values, taken
 from limb_nodes.nodes.health import WINDOW, Counts, Steps
 from limb_nodes.nodes.messages import class_of
 from limb_nodes.nodes.onlookers import Onlookers
@@ -202,11 +202,20 @@ class LimbNode(Node):
         if self.following:
             return
         part, watch = self.part, self.watch
+        if watch.waited >= SOON:
+            self.take_unnoticed()
         if said := watch.look(time.monotonic(), part.done, part.awaited()):
             self.get_logger().warning(said)
             self.diagnose(said, WARN, waited=f"{watch.waited:.1f}")
         if watch.given_up:
             self.fail(RunError(f"{self.get_name()} has waited {watch.waited:.0f} s for {part.awaited()}"))
+
+    def take_unnoticed(self) -> None:
+        """Take messages that have come without the executor's notice, as may happen while it is being made."""
+        for subscription in self.subscriptions:
+            for message in taken(subscription, raw=subscription.raw):
+                self.get_logger().debug(f"a message on {subscription.topic_name} has come unnoticed")
+                subscription.callback(message)
 
     def fail(self, error: UserError) -> None:
         """Let whoever spins the node know that it cannot go on."""

@@ -21,10 +21,10 @@ def make_executor(context: Context) -> Executor:
     return EventsExecutor(context=context)
 
 
-def taken(subscription: Subscription) -> Iterator[bytes]:
-    """The serialised messages that have come on a topic and that no executor has taken."""
+def taken(subscription: Subscription, raw: bool = True) -> Iterator[Any]:
+    """The messages that have come on a topic and that no executor has taken; raw: serialised."""
     take, kind = subscription.handle.take_message, subscription.msg_type
-    while (message := take(kind, True)) is not None:
+    while (message := take(kind, raw)) is not None:
         yield message[0]
 
 

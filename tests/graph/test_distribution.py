@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import rclpy
+from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
@@ -74,3 +75,20 @@ def test_an_executor_leaves_alone_what_is_no_subscription_of_its_node(bench):
     left: list[bytes] = []
     graph.until(lambda: left.extend(distribution.taken(subscription)) or left, "the message")
     assert taken == []
+
+
+def test_what_has_come_without_the_executors_notice_is_taken_once(bench, until, limb):
+    from limb_nodes.nodes.limb_dynamics import LimbDynamics
+
+    graph = bench()
+    node = graph.add(LimbDynamics, limb=limb, rate=200.0)
+    heard: list[Header] = []
+    node.listen(Header, "topic", heard.append, 10)
+    publisher = graph.publisher(Header, "topic", 10)
+    publisher.publish(Header(frame_id="a"))
+    # The executor has no turn.
+    until(lambda: publisher.wait_for_all_acked(Duration(seconds=1.0)), "the message to arrive")
+    until(lambda: node.take_unnoticed() or heard, "it to be taken")
+    publisher.publish(Header(frame_id="b"))
+    graph.until(lambda: len(heard) > 1, "the next one, by the executor")
+    assert [message.frame_id for message in heard] == ["a", "b"]
