@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from limb_nodes.analysis.curves import characteristics
+from limb_nodes.analysis.curves.picture import shortened
 from limb_nodes.cli import main
 from limb_nodes.model import load_limb, with_values
 
@@ -171,3 +172,22 @@ def test_limb_without_muscles(tmp_path, capsys):
     (tmp_path / "bare.yaml").write_text(bare, encoding="utf-8")
     assert main(["curves", str(tmp_path / "bare.yaml"), "-o", str(tmp_path / "x.png")]) == 2
     assert "muscles is empty" in capsys.readouterr().err
+
+
+def test_a_muscle_over_two_joints_has_a_curve_for_each():
+    leg = panels(load_limb(ROOT / "tests" / "levels" / "two_joint_leg.yaml"))
+    arms = {curve.label: curve for curve in leg["moment_arm"].curves}
+    hip, knee = arms["hamstrings, hip"], arms["hamstrings, knee"]
+    assert set(hip.y) == {-0.06}
+    assert set(knee.y) == {-0.035}
+    assert (hip.key, hip.style, knee.key, knee.style) == ("hamstrings", 0, "hamstrings", 1)
+    assert (hip.x[0], hip.x[-1], knee.x[0], knee.x[-1]) == (-1.5, 2.0, -2.4, 0.2)
+    path = {curve.label: curve for curve in leg["path"].curves}["hamstrings, knee"]
+    # The hip stays at 0.3 rad, as at the start.
+    assert np.interp(-0.5, path.x, path.y) == pytest.approx(0.44, abs=1e-12)
+
+
+def test_long_labels_are_shortened():
+    assert shortened("flexor, extensor") == "flexor, extensor"
+    many = ", ".join(f"muscle_number_{k}" for k in range(5))
+    assert shortened(many) == "muscle_number_0, muscle_number_1, 3 more"

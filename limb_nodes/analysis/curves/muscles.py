@@ -139,9 +139,10 @@ def by_angle(limb: Limb, variable: str, diagram: Characteristic) -> Characterist
     for number, joint in limb.crossings:
         muscle, angles = limb.muscles[number], joint_angles(limb, joint)
         label = muscle.name if len(muscle.joints) == 1 else f"{muscle.name}, {limb.joint_names[joint]}"
-        diagram.add(Curve(label, angles, path_values(limb, muscle, joint, angles, variable), muscle.name))
+        values = path_values(limb, muscle, joint, angles, variable)
+        diagram.add(Curve(label, angles, values, muscle.name, style=muscle.joints.index(joint)))
     if any(len(muscle.joints) > 1 for muscle in limb.muscles):
-        diagram.note = "by one joint, others as at the start"
+        diagram.note = "one joint turns"
     return diagram
 
 

@@ -19,6 +19,8 @@ PREFIXES = ((1e-12, "p"), (1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e
 PREFIXED = {"m", "m/s", "N"}
 # More curves than this have small labels.
 MANY = 9
+# Signs of a label at most.
+LONGEST = 40
 
 
 @styled
@@ -54,7 +56,7 @@ def draw_characteristic(axes: Axes, diagram: Characteristic, colours: Mapping[st
             STYLES[curve.style % len(STYLES)],
             color=colours[curve.key],
             lw=width[curve.key],
-            label=curve.label or None,
+            label=shortened(curve.label) or None,
         )
     axes.set_xlabel(f"{diagram.x.label} [{x_unit}]")
     axes.set_ylabel(f"{diagram.y.label} [{y_unit}]")
@@ -63,9 +65,19 @@ def draw_characteristic(axes: Axes, diagram: Characteristic, colours: Mapping[st
     axes.text(0.0, 1.025, below, transform=axes.transAxes, fontsize=SMALL, color=GREY)
     set_limits(axes, diagram, x_factor)
     count = sum(1 for curve in diagram.curves if curve.label)
-    legend = axes.legend(fontsize=SMALL if count <= MANY else SMALL - 1.5, ncols=2 if count > 5 else 1)
+    if count <= MANY:
+        legend = axes.legend(fontsize=SMALL, ncols=2 if count > 5 else 1)
+    else:
+        # Among so many curves there is no place for it.
+        legend = axes.legend(fontsize=SMALL - 1.5, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.17))
     for line in legend.get_lines():
         line.set_linewidth(1.8)
+
+
+def shortened(label: str) -> str:
+    """The label of a curve that stands for many: the first two, and how many more."""
+    names = label.split(", ")
+    return label if len(label) <= LONGEST else f"{names[0]}, {names[1]}, {len(names) - 2} more"
 
 
 def set_limits(axes: Axes, diagram: Characteristic, x_factor: float) -> None:
