@@ -77,16 +77,18 @@ class RandomMuscle:
 
 
 class RandomLimb:
-    """A chain of 1 to 5 joints with muscles, tissue and ranges, all drawn from a seed.
+    """A chain of joints with muscles, tissue and ranges, all drawn from a seed.
 
     impacts: how many the last solution had.
     """
 
     impacts = 0
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, joints: int = 0) -> None:
+        """joints: how many; 0 for 1 to 5 by the seed."""
         draw = np.random.default_rng(seed)
-        n = self.joints = int(draw.integers(1, 6))
+        drawn = int(draw.integers(1, 6))
+        n = self.joints = joints or drawn
         self.mass, self.length = draw.uniform(0.5, 4.0, n), draw.uniform(0.2, 0.5, n)
         self.com, self.inertia = self.length * draw.uniform(0.3, 0.6, n), draw.uniform(0.01, 0.05, n)
         self.angle, self.velocity = draw.uniform(-0.6, 0.6, n), draw.uniform(-2.0, 2.0, n)
