@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limb_nodes.analysis.trajectory import joint_torque
 from limb_nodes.bags.bulk import write_table
 from limb_nodes.bags.types import make_message
 from limb_nodes.bags.write import BagWriter
@@ -89,9 +90,7 @@ def movement_topics(limb: Limb, movement: Movement, tick: NDArray[np.uint64], la
     count = len(tick)
     last = np.full(count, last_tick)
     joints, muscles, names = limb.joint_names, limb.muscle_names, point_names(limb)
-    torque = np.zeros((count, len(joints)))
-    for crossing, (_, joint) in enumerate(limb.crossings):
-        torque[:, joint] += movement.muscle["muscle_torque"][:, crossing]
+    torque = joint_torque(limb, movement)
     position = np.zeros((count, len(names), 3))
     position[:, :, :2] = [points(limb, angle) for angle in movement.angle]
     driven = {"tick": tick, "last_tick": last, "activation": movement.excitation}
@@ -116,16 +115,12 @@ def state_topics(limb: Limb, movement: Movement, tick: NDArray[np.uint64]) -> li
     if not limb.muscles:
         return []
     owners = [muscle.name for muscle in limb.muscles for _ in muscle.units]
-    muscles = {
-        "name": limb.muscle_names,
-        "torque_muscle": [limb.muscle_names[muscle] for muscle, _ in limb.crossings],
-        "torque_joint": [limb.joint_names[joint] for _, joint in limb.crossings],
-    }
+    of_torques = dict(zip(("torque_muscle", "torque_joint"), limb.crossing_names, strict=True))
     units = {"muscle": owners, "unit": [unit.name for muscle in limb.muscles for unit in muscle.units]}
     return [
         Topic(name, names, {"tick": tick, **{field: values[output] for field, output in fields.items()}})
         for name, names, fields, values in (
-            ("muscle_state", muscles, MUSCLE_FIELDS, movement.muscle),
+            ("muscle_state", {"name": limb.muscle_names, **of_torques}, MUSCLE_FIELDS, movement.muscle),
             ("motor_unit_state", units, UNIT_FIELDS, movement.unit),
             ("sarcomere_state", units, SARCOMERE_FIELDS, movement.unit),
         )

@@ -34,17 +34,22 @@ class Trajectory:
     sarcomere: dict[str, FloatArray] = field(default_factory=dict)
 
 
-def trajectory_of_movement(limb: Limb, movement: Movement) -> Trajectory:
-    """The trajectory of a movement that was solved with its outputs."""
+def joint_torque(limb: Limb, movement: Movement) -> FloatArray:
+    """The torque of all muscles on each joint (N m) [T, n] (2.61) of a movement that was solved with its outputs."""
     torque = np.zeros_like(movement.angle)
     for crossing, (_, joint) in enumerate(limb.crossings):
         torque[:, joint] += movement.muscle["muscle_torque"][:, crossing]
+    return torque
+
+
+def trajectory_of_movement(limb: Limb, movement: Movement) -> Trajectory:
+    """The trajectory of a movement that was solved with its outputs."""
     return Trajectory(
         time=movement.time,
         angle=movement.angle,
         velocity=movement.velocity,
         acceleration=movement.acceleration,
-        torque=torque,
+        torque=joint_torque(limb, movement),
         activation=movement.excitation,
         muscle={key: movement.muscle[name] for key, name in MUSCLE_FIELDS.items()},
         unit={key: movement.unit[name] for key, name in UNIT_FIELDS.items()},

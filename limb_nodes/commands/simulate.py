@@ -106,8 +106,7 @@ class Summary:
     """What is told of a movement: how long it took to solve, where its joints went, what does not balance or fit."""
 
     def __init__(self, limb: Limb, ranges: Ranges) -> None:
-        self._limb, self._joints, self._ranges = limb, limb.joint_names, ranges
-        joints = self._joints
+        self._limb, self._ranges, joints = limb, ranges, limb.joint_names
         self._seconds = self._end = 0.0
         self._steps = 0
         self._lowest = [math.inf] * len(joints)
@@ -129,13 +128,13 @@ class Summary:
 
     def lines(self) -> list[str]:
         """The lines for a person."""
+        from limb_nodes.model.path_remarks import unequal_work
+
         rows = [("joint", "lowest", "highest", "at the end", "degrees")]
-        for joint, *angles in zip(self._joints, self._lowest, self._highest, self._last, strict=True):
+        for joint, *angles in zip(self._limb.joint_names, self._lowest, self._highest, self._last, strict=True):
             lowest, highest, last = map(math.degrees, angles)
             rows.append((joint, f"{lowest:.3f}", f"{highest:.3f}", f"{last:.4f}", ""))
         solved = f"solved     {self._end:g} s in {self._seconds:.3g} s, {self._steps} steps"
         left = [f"range      {length} {told}" for length, told in self._ranges.told().items()]
-        from limb_nodes.model.path_remarks import unequal_work
-
         work = [f"work       {told}"] if (told := unequal_work(self._limb)) else []
         return [solved, *aligned(rows, "lrrr"), *work, *left]

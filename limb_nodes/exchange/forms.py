@@ -121,8 +121,8 @@ def forms_of(limb: Limb) -> dict[str, Form]:
         "muscle_state": {
             "name": muscles,
             **zeros(MUSCLE_FIELDS, len(muscles)),
-            "torque_muscle": [muscles[muscle] for muscle, _ in limb.crossings],
-            "torque_joint": [joints[joint] for _, joint in limb.crossings],
+            "torque_muscle": limb.crossing_names[0],
+            "torque_joint": limb.crossing_names[1],
             **zeros(["torque"], len(limb.crossings)),
         },
         "motor_unit_state": {**of_unit, **zeros(UNIT_FIELDS, units)},

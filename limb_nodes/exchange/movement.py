@@ -307,7 +307,7 @@ class LimbPart(Part):
         """What is to be said before the message with which the recording ends."""
 
     def send_pattern(self, rows: FloatArray) -> None:
-        """Send the movement of this tick under torque and slopes [4, n]."""
+        """Send the movement of this tick under torque and slopes [2 + 2 n, n]."""
         values, shown, stepper = self.pattern.values, self.joint_states.values, self.stepper
         values["impacts"][...] = self.impacts
         values["angle"][:], values["velocity"][:] = stepper.angle, stepper.velocity

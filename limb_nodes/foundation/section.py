@@ -129,6 +129,12 @@ class Section:
                 self.fail(key, f"is not a key here; allowed: {', '.join(sorted(self._taken))}")
 
 
+def present(value: float | None) -> float:
+    """A number that is in the file or has a numeric default."""
+    assert value is not None
+    return value
+
+
 def describe(value: Any) -> str:
     """A value in an error message, shortened."""
     if value is None:

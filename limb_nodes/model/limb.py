@@ -95,3 +95,9 @@ class Limb:
     def crossings(self) -> list[tuple[int, int]]:
         """Each muscle, by its place in `muscles`, with each of the joints that it crosses."""
         return [(number, joint) for number, muscle in enumerate(self.muscles) for joint in muscle.joints]
+
+    @property
+    def crossing_names(self) -> tuple[list[str], list[str]]:
+        """Of all crossings, the names of their muscles, and those of their joints."""
+        muscles, joints = self.muscle_names, self.joint_names
+        return [muscles[muscle] for muscle, _ in self.crossings], [joints[joint] for _, joint in self.crossings]

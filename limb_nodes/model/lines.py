@@ -54,7 +54,7 @@ def muscle_lines(limb: Limb, angle: Sequence[float]) -> dict[str, list[Point]]:
 def points_of(path: Mapping[str, float], starts: Sequence[Point], directions: Sequence[float]) -> list[Point]:
     """The points of a path of straight lines. starts, directions: of the base and the segments (m, rad)."""
     found = []
-    for number in range(sum(name.startswith("segment_") and not name.startswith("segment_length") for name in path)):
+    for number in range(sum(name.startswith("x_") for name in path)):
         segment = int(path[f"segment_{number}"])
         x, y = starts[segment]
         for far, way in ((path[f"x_{number}"], 0.0), (path[f"y_{number}"], 0.5 * math.pi)):

@@ -12,7 +12,7 @@ from typing import Any
 
 from limb_nodes.errors import UserError
 from limb_nodes.foundation.parameter import Parameter
-from limb_nodes.foundation.section import Section
+from limb_nodes.foundation.section import Section, present
 from limb_nodes.foundation.yaml_text import parse_yaml, read_yaml, yaml_text
 from limb_nodes.levels import CONTRACTS, MUSCLE_PROCESSES, UNIT_PROCESSES, motor_unit
 from limb_nodes.levels.motor_unit.recruitment import unit_thresholds
@@ -320,9 +320,3 @@ def refuse_duplicates(section: Section, key: str, field: str, names: list[str]) 
 def pair(values: tuple[float, ...]) -> tuple[float, float]:
     """A vector of two numbers."""
     return (values[0], values[1])
-
-
-def present(value: float | None) -> float:
-    """A number that is in the file or has a numeric default."""
-    assert value is not None
-    return value

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
 from itertools import pairwise
 
+from limb_nodes.model.along_joint import along_joint
 from limb_nodes.model.curve_checks import grid
 from limb_nodes.model.limb import Limb, Muscle
-from limb_nodes.model.probe import BrokenLaw, Probe, given
+from limb_nodes.model.probe import BrokenLaw
 from limb_nodes.model.system import crossings_of
 
 ANGLES = 40
@@ -34,27 +34,19 @@ def warn_of_arms(limb: Limb) -> None:
 
 def sign_change(limb: Limb, muscle: Muscle, joint: int) -> float | None:
     """The angle (rad) of a joint at which a muscle's moment arm on it is 0; None if it keeps its sign."""
-    ending = crossings_of(muscle.laws["path"].law)[muscle.joints.index(joint)]
-    arms = [(angle, point[f"moment_arm{ending}"]) for angle, point in over_range(limb, muscle, joint)]
-    arms = [(angle, arm) for angle, arm in arms if arm]
+    arms = [(angle, point["moment_arm"]) for angle, point in over_range(limb, muscle, joint) if point["moment_arm"]]
     for (near, before), (far, after) in pairwise(arms):
         if before * after < 0.0:
             return near + (far - near) * before / (before - after)
     return None
 
 
-def over_range(limb: Limb, muscle: Muscle, joint: int) -> Iterator[tuple[float, dict[str, float]]]:
-    """A joint's angles over its range, and what a muscle's path is there at 1 rad/s, the other joints at the start."""
-    chosen = muscle.laws["path"]
-    probe = Probe(chosen, given(chosen), {"role": muscle.role})
-    still: dict[str, float] = {}
-    for ending, crossed in zip(crossings_of(chosen.law), muscle.joints, strict=True):
-        still |= {f"joint_angle{ending}": limb.segments[crossed].angle, f"joint_velocity{ending}": 0.0}
-    ending = crossings_of(chosen.law)[muscle.joints.index(joint)]
+def over_range(limb: Limb, muscle: Muscle, joint: int) -> list[tuple[float, dict[str, float]]]:
+    """A joint's angles over its range, and what a muscle's path is there at 1 rad/s."""
     low, high = limb.segments[joint].joint_range or (-math.pi, math.pi)
     # Without the ends: stretched out, a path may lie in its joint's axis.
-    for angle in grid(low, high, ANGLES)[1:-1]:
-        yield angle, probe.at(**{**still, f"joint_angle{ending}": angle, f"joint_velocity{ending}": 1.0})
+    angles = grid(low, high, ANGLES)[1:-1]
+    return list(zip(angles, along_joint(limb, muscle, joint, angles, speed=1.0), strict=True))
 
 
 def unequal_work(limb: Limb) -> str:

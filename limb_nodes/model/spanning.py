@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from limb_nodes.foundation.parameter import Parameter
-from limb_nodes.foundation.section import Section, describe
+from limb_nodes.foundation.section import Section, describe, present
 from limb_nodes.levels import Law
 from limb_nodes.levels.muscle import linear_path, polynomial_path, straight_path
 from limb_nodes.levels.muscle.spanning_path import LENGTH, spanning
@@ -63,7 +63,7 @@ def read_joints(section: Section, segments: Sequence[Segment]) -> tuple[int, ...
 
 def read_linear(section: Section, crossed: Crossed) -> tuple[Law, dict[str, float]]:
     """Constant moment arms: length, moment_arms by joint, and angles by joint, at which the length is that."""
-    values = {"length": section.number(linear_path.LENGTH_AT_REFERENCE) or 0.0}
+    values = {"length": present(section.number(linear_path.LENGTH_AT_REFERENCE))}
     arms = by_joint(section, linear_path.MOMENT_ARM, crossed)
     angles = by_joint(section, linear_path.REFERENCE_ANGLE, crossed)
     for place, (arm, angle) in enumerate(zip(arms, angles, strict=True)):
@@ -80,9 +80,9 @@ def by_joint(section: Section, parameter: Parameter, crossed: Crossed) -> list[f
     if not section.has(key):
         section.fail(key, f"is missing; {parameter.allowed()} is needed for each of {', '.join(names)}")
     of_joint = section.section(key)
-    values = [of_joint.number(replace(parameter, name=name)) for name in names]
+    values = [present(of_joint.number(replace(parameter, name=name))) for name in names]
     of_joint.finish()
-    return [float(value) for value in values if value is not None]
+    return values
 
 
 def read_polynomial(section: Section, crossed: Crossed) -> tuple[Law, dict[str, float]]:
@@ -94,11 +94,11 @@ def read_polynomial(section: Section, crossed: Crossed) -> tuple[Law, dict[str, 
     if len(terms) > MOST_TERMS:
         section.fail("terms", f"has {len(terms)} entries; {MOST_TERMS} at most are needed")
     for number, term in enumerate(terms):
-        values[f"coefficient_{number}"] = term.number(polynomial_path.COEFFICIENT) or 0.0
+        values[f"coefficient_{number}"] = present(term.number(polynomial_path.COEFFICIENT))
         power = Parameter("power", "1", "", 0.0, minimum=0.0, maximum=polynomial_path.MOST_POWER, integer=True)
         given = term.section("powers") if term.has("powers") else Section(term.file, term.at("powers"), {})
         term.take("powers")
-        powers.append(tuple(int(given.number(replace(power, name=name)) or 0) for name in names))
+        powers.append(tuple(int(present(given.number(replace(power, name=name)))) for name in names))
         given.finish()
         term.finish()
         if powers[-1] in powers[:-1]:

@@ -63,9 +63,8 @@ class LimbNode(Node):
 
     part: what it does in a run. failure: why it cannot go on, and the exit status, for whoever spins it; a text,
     because an error would keep the node and all that it knows alive. typed: names of the parameters that a person has
-    typed for this node alone. former: the identities of the runs in whose place
-    this one began, the last one last. following: that of the run that is to begin in place of this one, once it is
-    known.
+    typed for this node alone. former: the identities of the runs in whose place this one began, the last one last.
+    following: that of the run that is to begin in place of this one, once it is known.
     """
 
     part: Part

@@ -241,8 +241,10 @@ class WholeModel:
 
         Of each part, `steps` are those from the start on. Raises SolveError behind the last instant that was reached.
         """
-        shown = self.layout.muscles * len(MUSCLE_OUTPUTS) + self.layout.units * len(UNIT_OUTPUTS)
-        numbers = 4 * self.state_scale.size + 4 * self.layout.drives + (2 * shown if observe else 0)
+        layout = self.layout
+        shown = layout.muscles * len(MUSCLE_OUTPUTS) + layout.units * len(UNIT_OUTPUTS)
+        shown += layout.crossings * len(CROSSING_OUTPUTS)
+        numbers = 4 * self.state_scale.size + 4 * layout.drives + (2 * shown if observe else 0)
         return self._parts(excitation, rate, min(LONGEST_PART, PART // numbers + 1), tolerance, method, observe)
 
     def _parts(

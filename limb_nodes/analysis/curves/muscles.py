@@ -13,8 +13,8 @@ from limb_nodes.analysis.curves.movement import moved, states_by_name
 from limb_nodes.analysis.curves.uses import Use, law_names, legend, muscle_uses, shared, words
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.model import ChosenLaw, Limb, Muscle
+from limb_nodes.model.along_joint import along_joint
 from limb_nodes.model.probe import Probe, given, initial_states
-from limb_nodes.model.system import crossings_of
 
 # A limb without limits on its joints turns once around.
 FREE = (-math.pi, math.pi)
@@ -110,14 +110,7 @@ def joint_angles(limb: Limb, joint: int) -> FloatArray:
 
 def path_values(limb: Limb, muscle: Muscle, joint: int, angles: FloatArray, variable: str) -> FloatArray:
     """A variable of a muscle's path by the angle of one of its joints, the others as at the start."""
-    chosen = muscle.laws["path"]
-    probe = Probe(chosen, given(chosen), {"role": muscle.role})
-    point: dict[str, float] = {}
-    for ending, crossed in zip(crossings_of(chosen.law), muscle.joints, strict=True):
-        point |= {f"joint_angle{ending}": limb.segments[crossed].angle, f"joint_velocity{ending}": 0.0}
-    ending = crossings_of(chosen.law)[muscle.joints.index(joint)]
-    shown = f"{variable}{ending}" if variable == "moment_arm" else variable
-    return np.array([probe.at(**{**point, f"joint_angle{ending}": float(angle)})[shown] for angle in angles])
+    return np.array([point[variable] for point in along_joint(limb, muscle, joint, angles)])
 
 
 def paths(limb: Limb) -> Characteristic:
