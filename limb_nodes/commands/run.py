@@ -85,8 +85,6 @@ def run(args: argparse.Namespace) -> int:
     from limb_nodes.exchange.watch import STALL_LIMIT
     from limb_nodes.foundation.parameter import Parameter
     from limb_nodes.foundation.topics import STATES
-    from limb_nodes.model import load_limb
-    from limb_nodes.model.path_remarks import unequal_work
     from limb_nodes.nodes.live_settings import LiveSettings
     from limb_nodes.nodes.resuming import resumed
     from limb_nodes.nodes.session import run_in_one_process, run_in_processes
@@ -150,8 +148,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"strangers  {outcome.foreign} messages of others kept out")
     if outcome.conflicts:
         print(f"doubtful   {outcome.conflicts} ticks came twice with different values: another publishes for this run")
-    if told := unequal_work(load_limb(ready.limb, ready.allow_laws)):
-        print(f"work       {told}")
+    if outcome.work:
+        print(f"work       {outcome.work}")
     for length, told in outcome.ranges.items():
         print(f"range      {length} {told}")
     if outcome.live:

@@ -43,8 +43,9 @@ def directional_derivative(function: ScalarFunction, active: frozenset[str]) -> 
         return name
 
     def call(helper: ScalarFunction) -> str:
-        known[helper.__name__] = helper
-        return helper.__name__
+        # Two of different modules may have one name.
+        known[name := f"value{len(known)}_{helper.__name__}"] = helper
+        return name
 
     tree = ast.parse(Derivative(function, active, call_derivative, call).source("directional"))
     # What is differentiated once more has tangents of its own.

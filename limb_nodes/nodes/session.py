@@ -21,6 +21,8 @@ from limb_nodes.errors import FieldError, RunError, UserError
 from limb_nodes.exchange.recorded import join_parts
 from limb_nodes.exchange.watch import LOOK_PERIOD, Watch
 from limb_nodes.foundation.topics import NODES, exchanged
+from limb_nodes.model import load_limb
+from limb_nodes.model.path_remarks import unequal_work
 from limb_nodes.nodes.activation_input import ActivationInput
 from limb_nodes.nodes.children import Crew
 from limb_nodes.nodes.distribution import make_executor
@@ -75,6 +77,7 @@ def run_in_one_process(settings: RunSettings, progress: Progress) -> Outcome:
             live=live.told() if live else "",
             lost=bool(live and live.lost),
             ranges=nodes["muscle_stack"].part.stepper.ranges.told(),
+            work=unequal_work(nodes["muscle_stack"].limb),
         )
     finally:
         close(context, executor, nodes.values())
@@ -121,6 +124,8 @@ def run_in_processes(settings: RunSettings, progress: Progress) -> Outcome:
             refuse_neighbours(context, settings.namespace)
             executor.add_node(observer)
             crew.start()
+            # While they start; when they have ended, the file may be another.
+            work = unequal_work(load_limb(settings.limb, settings.allow_laws))
             seconds = await_the_end(executor, observer, crew, interrupt, progress)
         finally:
             crew.stop()
@@ -128,7 +133,7 @@ def run_in_processes(settings: RunSettings, progress: Progress) -> Outcome:
         if interrupt.wanted and not Path(settings.out).exists():
             return Outcome(0, 0, 0, 0, 0, 0, 0.0, True)
         crew["recorder"].raise_failure()
-        return recorded_outcome(settings, seconds, interrupt.wanted)
+        return recorded_outcome(settings, seconds, interrupt.wanted, work)
     finally:
         close(context, executor, [observer])
 

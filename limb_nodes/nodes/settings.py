@@ -86,7 +86,7 @@ class Outcome:
     missed: deadlines in real time; bad_input: messages that could not be used; foreign: messages of others; conflicts:
     ticks that came twice with different values; seconds: wall time. live: how a live source did, in words, empty
     without one; lost: whether it never came, or was silent at the end. ranges: by length, how far muscles were out
-    of their range, in words.
+    of their range, in words. work: which muscles do other work than their torque, in words, empty if none does.
     """
 
     ticks: int
@@ -100,6 +100,7 @@ class Outcome:
     live: str = ""
     lost: bool = False
     ranges: Mapping[str, str] = field(default_factory=dict)
+    work: str = ""
 
 
 def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
@@ -138,15 +139,16 @@ def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
     return replace(settings, limb=limb_file, out=out, source=source, resume=resume), final
 
 
-def recorded_outcome(settings: RunSettings, seconds: float, interrupted: bool) -> Outcome:
-    """Count what the bag of a run holds."""
+def recorded_outcome(settings: RunSettings, seconds: float, interrupted: bool, work: str) -> Outcome:
+    """Count what the bag of a run holds. work: as in `Outcome`."""
     with BagReader(settings.out) as bag:
         ticks = bag.count("joint_states")
         missing = 0
         for topic in ("activation", "joint_torque", "movement_pattern", *settings.states):
             every = settings.state_every if topic in settings.states else 1
             missing += max(0, -(-ticks // every) - bag.count(topic))
-        return Outcome(ticks, missing, seconds=seconds, interrupted=interrupted, **reported(bag, settings))
+        counted = {"seconds": seconds, "interrupted": interrupted, "work": work}
+        return Outcome(ticks, missing, **counted, **reported(bag, settings))
 
 
 def reported(bag: BagReader, settings: RunSettings) -> dict[str, Any]:

@@ -189,5 +189,7 @@ def test_a_muscle_over_two_joints_has_a_curve_for_each():
 
 def test_long_labels_are_shortened():
     assert shortened("flexor, extensor") == "flexor, extensor"
+    two = "a_muscle_with_a_very_long_name_indeed, a_joint"
+    assert shortened(two) == two
     many = ", ".join(f"muscle_number_{k}" for k in range(5))
     assert shortened(many) == "muscle_number_0, muscle_number_1, 3 more"

@@ -60,6 +60,7 @@ def test_four_processes_give_the_same_values(reference, limb, waves, bags, tmp_p
     seen: list[int] = []
     outcome = run_in_processes(run, seen.append)
     assert (outcome.ticks, outcome.missing, outcome.bad_input) == (TICKS, 0, 0)
+    assert outcome.work.startswith("flexor, extensor: shorten by ")
     assert bags.differences(reference, tmp_path / "run") == []
 
 

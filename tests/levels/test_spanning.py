@@ -260,6 +260,36 @@ def test_a_law_of_ones_own_gives_the_length_alone(leg, tmp_path, excitation):
     assert math.isclose(found.muscle["muscle_tendon_length"][0, 0], 0.44 + 0.03 * math.sin(0.3) - 0.012)
 
 
+SAME_NAMES = """
+from limb_nodes.levels import law
+from other import scaled as theirs
+
+
+def scaled(x):
+    return 0.04 * x
+
+
+@law("path")
+def mixed(hip_angle, knee_angle):
+    return 0.44 + scaled(hip_angle) * (1.0 + theirs(knee_angle))
+"""
+
+
+def test_helpers_of_a_law_may_have_one_name(leg, tmp_path, excitation, monkeypatch):
+    (tmp_path / "other.py").write_text("def scaled(x):\n    return 0.03 * x * x\n")
+    (tmp_path / "mine.py").write_text(SAME_NAMES)
+    monkeypatch.syspath_prepend(tmp_path)
+    muscle = dict(leg.content["muscles"][3], path={"law": "mine:mixed"})
+    file = tmp_path / "leg.yaml"
+    file.write_text(yaml_text(dict(leg.content, muscles=[muscle])))
+    found = WholeModel(load_limb(file, allow_laws=True)).simulate(excitation[:50, :1], RATE)
+    force = found.muscle["muscle_force"][:, 0]
+    hip, knee = found.muscle["muscle_torque"].T
+    at_hip, at_knee = found.angle[:, 0], found.angle[:, 1]
+    np.testing.assert_allclose(hip, -0.04 * (1.0 + 0.03 * at_knee**2) * force, rtol=1e-12)
+    np.testing.assert_allclose(knee, -0.04 * at_hip * 0.06 * at_knee * force, rtol=1e-12)
+
+
 BAD = {
     "a joint twice": ({"joints": ["knee", "knee"]}, "muscles[0].joints[1] is 'knee' a second time"),
     "a gap": ({"joints": ["hip", "ankle"]}, "muscles[0].joints is ['hip', 'ankle'], without knee in between"),

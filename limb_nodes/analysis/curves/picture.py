@@ -77,7 +77,7 @@ def draw_characteristic(axes: Axes, diagram: Characteristic, colours: Mapping[st
 def shortened(label: str) -> str:
     """The label of a curve that stands for many: the first two, and how many more."""
     names = label.split(", ")
-    return label if len(label) <= LONGEST else f"{names[0]}, {names[1]}, {len(names) - 2} more"
+    return label if len(label) <= LONGEST or len(names) < 3 else f"{names[0]}, {names[1]}, {len(names) - 2} more"
 
 
 def set_limits(axes: Axes, diagram: Characteristic, x_factor: float) -> None:
