@@ -10,6 +10,7 @@ from limb_nodes.foundation.parameter import is_finite
 from limb_nodes.foundation.section import Section, one_line
 from limb_nodes.levels import CONTRACTS, REGISTRY, Law
 from limb_nodes.model.chosen import ChosenLaw
+from limb_nodes.model.spanning import READERS
 from limb_nodes.model.system import all_parameters
 from limb_nodes.model.user_code import UserCode, module_of
 
@@ -68,10 +69,8 @@ def find_law(section: Section, process: str, code: UserCode | None) -> tuple[Law
     if name in known:
         return known[name], ""
     if ":" not in name:
-        section.fail(
-            "law",
-            f"is {name!r}; allowed: {', '.join(sorted(known))}, or an import path module:name",
-        )
+        allowed = ", ".join(sorted({*known, *(READERS if process == "path" else ())}))
+        section.fail("law", f"is {name!r}; allowed: {allowed}, or an import path module:name")
     module_name, attribute = module_of(name), name.partition(":")[2]
     if code is None:
         return Law(process, attribute, ()), module_name

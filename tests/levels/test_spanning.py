@@ -300,6 +300,10 @@ BAD = {
         {"path": {"law": "geometric_moment_arm", "moment_arm": 0.01, "proximal_distance": 0.1, "distal_distance": 0.1}},
         "muscles[0].path.law is 'geometric_moment_arm', a law for one joint; over hip, knee allowed: linear, ",
     ),
+    "a law misspelt": (
+        {"path": {"law": "polynom"}},
+        "muscles[0].path.law is 'polynom'; allowed: constant_moment_arm, geometric_moment_arm, linear, polynomial, ",
+    ),
     "an arm missing": (
         {"path": {"law": "linear", "length": 0.4, "moment_arms": {"hip": 0.1}}},
         "muscles[0].path.moment_arms.knee is missing; a number > -1 and < 1 in m is needed",
