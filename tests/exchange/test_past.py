@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from limb_nodes.errors import UserError
+from limb_nodes.exchange.movement import LimbPart
 from limb_nodes.exchange.past import Past, expected_topics, past_of
 from limb_nodes.exchange.recorded import RecordedRun, join_parts
 from limb_nodes.exchange.stream import CHECKPOINT
 from limb_nodes.exchange.ticks import Ticks
 from limb_nodes.model import load_limb
 from limb_nodes.model.limb import Limb
-from tests.exchange.parts import Message, cut, run_parts
+from tests.exchange.parts import IDENTITY, Message, cut, run_parts
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMBS = [*sorted((ROOT / "params").glob("*_joint*.yaml")), ROOT / "params/pennate_leg.yaml"]
@@ -67,6 +68,22 @@ def test_what_is_behind_a_gap_is_not_used():
     assert (past.tick, past.counts["joint_torque"], past.counts["muscle_state"]) == (199, 200, 67)
     assert past.muscles is not None
     assert past.muscles[0] == CHECKPOINT
+
+
+def test_what_another_version_has_recorded_is_refused_in_words():
+    """One whose movement patterns did not tell the impacts."""
+    limb, whole = undisturbed(LIMBS[0])
+    part = LimbPart(limb=limb, ticks=TICKS, identity=IDENTITY)
+    start = part.forms["movement_pattern"].numbers["impacts"][0]
+    recorded = [
+        (topic, data[:start] + data[start + 8 :] if topic == "movement_pattern" else data)
+        for topic, data in cut(whole, 40)
+    ]
+    past = past_of(recorded, EVERY, TICKS.nanoseconds)
+    with pytest.raises(
+        UserError, match=r"the recorded movement_pattern .*; a bag that was recorded by this version is"
+    ):
+        part.take_up(past)
 
 
 def test_nothing_recorded_is_the_start():
