@@ -56,9 +56,9 @@ def add_parser(subparsers: Any) -> None:
         "alone for one that is not used (default: the muscles)",
     )  # fmt: skip
     live.add_argument(
-        "--on-silence", choices=("hold", "zero", "stop"), default="hold",
-        help="if a source is silent, hold its last activations, make them zero, or stop the run; one that never came "
-        "has 10 s to come (default hold)",
+        "--on-silence", choices=("zero", "hold", "stop"), default="zero",
+        help="if a source is silent, make its activations zero, hold the last ones, or stop the run; one that never "
+        "came has 10 s to come (default zero)",
     )  # fmt: skip
     live.add_argument(
         "--silence", type=float, default=0.5, metavar="S", help="a source is silent after so long (default 0.5)"

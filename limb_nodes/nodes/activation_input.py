@@ -82,7 +82,7 @@ class ActivationInput(LimbNode):
                 "channels", "", "live: CHANNEL=MUSCLE,... renames; raw EMG: all channels in the order of the values"
             ),
             on_silence=self.choice(
-                "on_silence", ON_SILENCE, "live: what a silent source leads to: hold or zero activations, stop the run"
+                "on_silence", ON_SILENCE, "live: what a silent source leads to: zero activations, the last held, a stop"
             ),
             silence=self.number(
                 "silence", default.silence, "live: a source is silent after so long, s", SILENCE.minimum or 0.0, longest

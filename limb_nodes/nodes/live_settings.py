@@ -12,7 +12,7 @@ from limb_nodes.signals.options import EnvelopeOptions
 
 # What is told of a live source on `/diagnostics`.
 HEARD, SILENT, NEVER_CAME = "heard", "silent", "never came"
-ON_SILENCE = ("hold", "zero", "stop")
+ON_SILENCE = ("zero", "hold", "stop")
 SILENCE = Parameter("silence", "s", "without a message", minimum=0.05, maximum=3600.0)
 EMG_RATE = Parameter("emg_rate", "Hz", "samples of each channel per second", minimum=0.0, maximum=1e6)
 

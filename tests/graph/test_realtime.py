@@ -140,7 +140,9 @@ def test_a_played_recording_moves_the_limb_as_in_lockstep(limb, lockstep, proces
     graph, out = bench(), tmp_path / "run"
     heard = graph.listen(MuscleActivation, exchanged("activation"), STREAM)
     player = processes.limb("play", bags.envelopes(tmp_path / "envelopes", envelope, rate), "--wait", "300")
-    live = processes.limb("run", resting, "--mode", "realtime", "--rate", "50", "--out", out, "--state-every", "50")
+    live = processes.limb(
+        "run", resting, "--mode", "realtime", "--rate", "50", "--out", out, "--state-every", "50", "--silence", "60"
+    )
     assert (player.wait(), player.said) == (0, ""), player.said
     messages, took = played(player)
     assert messages == 151

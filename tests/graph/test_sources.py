@@ -199,7 +199,7 @@ def test_a_replay_gives_the_activations_of_the_bag(player, bench, limb, bags, fo
     times = np.arange(0.0, player.pace * (SPAN + 1) / RATE + 1.0 / player.rate, 1.0 / player.rate)
     values = recording(times)
     bag = bags.envelopes(tmp_path / "bag", values, player.rate)
-    live = Live(bench(), limb)
+    live = Live(bench(), limb, silence=60.0)
     publisher = foreign(EmgEnvelope, "emg_envelope", QUALITIES[player.quality])
     start, sent, found = live.tick, 0, []
     for k in range(SPAN):
@@ -300,7 +300,7 @@ def test_raw_emg_is_filtered_as_limb_emg_does(quality, bench, limb, foreign, tmp
     wanted = envelopes(read_recording(str(tmp_path / "emg.csv"), rate=rate), options).values
     live = Live(
         bench(), limb, emg_rate=rate, channels="EMG 1=extensor,ACC,EMG 2=flexor", maximum="EMG 1=0.2,EMG 2=40",
-        mains=50.0, band="30,400", low_pass=8.0,
+        mains=50.0, band="30,400", low_pass=8.0, silence=60.0,
     )  # fmt: skip
     publisher = foreign(Float64MultiArray, "emg", quality)
     # Without a value: nothing has begun yet.
@@ -357,8 +357,8 @@ def test_live_settings_that_cannot_be(given, option, part, limb, tmp_path, capfd
 
 def test_live_settings_need_a_live_source(limb, tmp_path, capfd):
     out = f"--out={tmp_path / 'run'}"
-    assert cli.main(["run", limb, "--activation=flexor=1,extensor=0", "--duration=1", "--on-silence=zero", out]) == 2
-    assert re.fullmatch(r"limb: error: --on-silence is zero; .*live.*\n", capfd.readouterr().err)
+    assert cli.main(["run", limb, "--activation=flexor=1,extensor=0", "--duration=1", "--on-silence=hold", out]) == 2
+    assert re.fullmatch(r"limb: error: --on-silence is hold; .*live.*\n", capfd.readouterr().err)
 
 
 def test_a_node_names_its_parameter(bench, limb):
@@ -445,7 +445,7 @@ def test_a_source_that_never_comes_stops_the_run_if_asked(bench, limb, monkeypat
 
 def test_sources_of_both_kinds_are_heard_together(bench, limb, foreign):
     """Also if the best-effort one comes last."""
-    live = Live(bench(), limb)
+    live = Live(bench(), limb, silence=60.0)
     reliable = foreign(EmgEnvelope, "emg_envelope", RELIABLE)
     live.first(reliable, envelope([0.1, 0.1]))
     best_effort = foreign(EmgEnvelope, "emg_envelope", BEST_EFFORT)
@@ -503,7 +503,7 @@ CASES = {
     "never": Case(lasts=0.0),
     "best_effort": Case(quality="best effort", options=PATIENT),
     "stops": Case(lasts=2.3, quality="best effort"),
-    "stops_zero": Case(lasts=2.3, options=("--on-silence", "zero", "--processes")),
+    "stops_hold": Case(lasts=2.3, options=("--on-silence", "hold", "--processes")),
     "stops_stop": Case(lasts=2.3, options=("--on-silence", "stop", "--duration", "600")),
     "names": Case(names=("left", "right")),
     "unstamped": Case(stamped=False, options=PATIENT),
@@ -603,7 +603,7 @@ def test_a_source_that_is_best_effort(runs):
 
 
 @pytest.mark.parametrize(
-    ("name", "left"), [("stops", [0.25, 0.75]), ("stops_zero", [0.0, 0.0]), ("stops_stop", [0.25, 0.75])]
+    ("name", "left"), [("stops", [0.0, 0.0]), ("stops_hold", [0.25, 0.75]), ("stops_stop", [0.25, 0.75])]
 )
 def test_a_source_that_stops(name, left, runs):
     run = runs[name]
