@@ -22,6 +22,17 @@ REACH = 8
 
 
 @njit(cache=True)
+def not_below_zero(before, after, start, end):
+    """The slopes at both ends of a piece, which is not to go below zero between two samples that are not.
+
+    A force that is less than nothing would feed energy in. Schmidt and Hess, BIT 28 (1988) 340.
+    """
+    if before < 0.0 or after < 0.0:
+        return start, end
+    return max(start, -3.0 * before), min(end, 3.0 * after)
+
+
+@njit(cache=True)
 def straight(before, after):
     """One interval [1, 4 n] of straight lines between two samples [n]."""
     piece = np.zeros((1, 4 * before.size))
@@ -39,11 +50,12 @@ def bent(earlier, before, after):
     """
     piece = np.zeros((1, 4 * before.size))
     for j in range(before.size):
-        bend = after[j] - 2.0 * before[j] + earlier[j]
-        if abs(bend) > STEEPEST_BEND:
+        rise, bend = after[j] - before[j], after[j] - 2.0 * before[j] + earlier[j]
+        slopes = rise - 0.5 * bend, rise + 0.5 * bend
+        if abs(bend) > STEEPEST_BEND or not_below_zero(before[j], after[j], *slopes) != slopes:
             bend = 0.0
         piece[0, 4 * j] = before[j]
-        piece[0, 4 * j + 1] = after[j] - before[j] - 0.5 * bend
+        piece[0, 4 * j + 1] = rise - 0.5 * bend
         piece[0, 4 * j + 2] = 0.5 * bend
     return piece
 
@@ -115,6 +127,7 @@ def cubics(samples, n, slopes, corner, table):
         # and if an input rests on a bound, a cubic must not swing past it.
         start = rise if corner[at] or rise == 0.0 else slopes[at]
         end = rise if corner[at + n] or rise == 0.0 else slopes[at + n]
+        start, end = not_below_zero(samples[at], samples[at + n], start, end)
         table[4 * at] = samples[at]
         table[4 * at + 1] = start
         table[4 * at + 2] = 3.0 * rise - 2.0 * start - end
