@@ -13,7 +13,8 @@ from limb_nodes.foundation.records import Record
 from limb_nodes.solve.explicit import EXPLICIT
 from limb_nodes.solve.failure import FAILURES, SolveError, where
 from limb_nodes.solve.implicit import IMPLICIT
-from limb_nodes.solve.integrate import DONE, PAUSED, integrate
+from limb_nodes.solve.integrate import CRAWLING, DONE, PAUSED, integrate
+from limb_nodes.solve.method import Method
 from limb_nodes.solve.pieces import REACH, corners, pieces
 from limb_nodes.solve.problem import CONTROL, give_inputs
 
@@ -50,22 +51,29 @@ class Course:
     """A solve from 0 s to `end` (s), with pieces of the input every `period` s.
 
     state: [states] where it stands. rows: how many wanted times it has passed. failure: why it cannot go further.
-    tolerance, method: as for `WholeModel.simulate`.
+    tolerance, method: as for `WholeModel.simulate`. may_change: whether an explicit method gives way to the implicit
+        one if its steps are small; always so with the method "auto".
     """
 
-    def __init__(self, model: WholeModel, end: float, period: float, tolerance: float, method: str) -> None:
+    def __init__(
+        self, model: WholeModel, end: float, period: float, tolerance: float, method: str, may_change: bool = False
+    ) -> None:
         self.model = model
         self.state = model.initial_state()
         self.rows = 0
         self.failure: SolveError | None = None
-        chosen = METHODS[model.suited_method if method == "auto" else method]
-        self._method = chosen.limited if model.limited else chosen.free
         self._data = model.new_data(period)
-        self._problem = model.problem(self._data, jacobian=chosen.implicit)
-        self._rest = np.empty(self.state.size)
+        self._rest = np.empty((self.state.size + 2, self.state.size))
         self._control = Record(CONTROL)
+        self._choose(METHODS[model.suited_method if method == "auto" else method])
+        self._control.watched[0] = not self._chosen.implicit and (may_change or method == "auto")
         self._control.end[0], self._control.rest[0] = end, self._rest.ctypes.data
         self._control.tolerance[0], self._control.longest[0] = tolerance, LONGEST_STEP
+
+    def _choose(self, method: Method) -> None:
+        self._chosen = method
+        self._method = method.limited if self.model.limited else method.free
+        self._problem = self.model.problem(self._data, jacobian=method.implicit)
 
     @property
     def time(self) -> float:
@@ -85,14 +93,20 @@ class Course:
         out = np.empty((len(stretch.times), self.state.size))
         self._data.first[0] = stretch.first
         self._control.pause[0] = pause
-        give_inputs(self._problem, stretch.inputs)
-        records = self._method.address, self._problem.address, self._control.address
-        status = integrate(*records, stretch.stops, self.model.state_scale, self.state, stretch.times, out)
+        reached, status = 0, CRAWLING
+        while status == CRAWLING:
+            give_inputs(self._problem, stretch.inputs)
+            records = self._method.address, self._problem.address, self._control.address
+            times, rows = stretch.times[reached:], out[reached:]
+            status = integrate(*records, stretch.stops, self.model.state_scale, self.state, times, rows)
+            reached += int(self._control.rows[0])
+            if status == CRAWLING:
+                self._choose(IMPLICIT)
+                self._control.watched[0] = 0
         if status not in (DONE, PAUSED):
             part = where(self.model, status, self.time, self.state, stretch.inputs, self._data)
             text = f"the solution stops at {self.time:.6g} s: {FAILURES[status]}{part}"
             self.failure = SolveError(f"{self.model.limb.file}: {text}")
-        reached = int(self._control.rows[0])
         self.rows += reached
         return out[:reached]
 

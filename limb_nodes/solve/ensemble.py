@@ -98,7 +98,7 @@ class SampleSolver:
                 )
             same = self.variants.same_drives(model)
             stretch = self.stretch if same else self.prepared(model)
-            states, steps = model.solve(stretch, order.tolerance, self.method)
+            states, steps = model.solve(stretch, order.tolerance, self.method, order.method == "auto")
             n, first = model.layout.joints, int(self.early)
             kept = states[first:]
             return Solution(self.times[first:], kept[:, :n], kept[:, n : 2 * n], kept[:, 2 * n :], steps)

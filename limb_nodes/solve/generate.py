@@ -501,10 +501,12 @@ def newton(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
         "slope = 0.0",
         "low, high = -math.inf, math.inf",
         "step = step_before = math.inf",
-        "squaring = False",
+        "squaring = found = False",
         "for _ in range(200):",
         *inner.lines,
         *(f"    {line}" for line in force_lines(kind, units, inner.slope("fibre_velocity"))),
+        "    if found:",
+        "        break",
         "    residual = total - total_fibre_force",
         "    if not (residual > 0.0 or residual < 0.0):",
         # Solved, or not a number, which the force then says.
@@ -520,12 +522,16 @@ def newton(body: Body, kind: MuscleKind, units: Sequence[UnitKind]) -> None:
         "    step = newton if quick else 0.5 * (low + high) - total_fibre_force",
         "    total_fibre_force += step",
         # Newton's method squares the relative error: behind such a step only rounding is left.
-        "    if abs(step) <= (1e-9 if quick else 4e-16) * abs(total_fibre_force):",
-        "        break",
+        "    found = abs(step) <= 4e-16 * abs(total_fibre_force)",
+        "    if quick:",
+        "        found = found or abs(residual) <= 1e-9 * abs(total_fibre_force)",
         # Two of its steps tell the factor of the square, and with it the step that would follow.
-        "    if quick and squaring and abs(step) ** 3 <= 1e-14 * abs(total_fibre_force) * step_before * step_before:",
-        "        break",
+        "        if squaring and abs(step) ** 3 <= 1e-14 * abs(total_fibre_force) * step_before * step_before:",
+        "            found = True",
         "    squaring = quick",
+        # Beside a weak damper little changes of the force are much of velocity: the slope must be that of the root.
+        f"    if found and slope > -100.0 and abs(step * {inner.slope('fibre_velocity')}) < 1e-6:",
+        "        break",
     )
 
 

@@ -30,9 +30,12 @@ from limb_nodes.solve.problem import (
 
 vector, table = f8[::1], f8[:, ::1]
 
-DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE, PAUSED, STRUCK = 0, 1, 2, 3, 4, 5
+DONE, TOO_MANY_STEPS, STEP_TOO_SMALL, NOT_FINITE, PAUSED, STRUCK, CRAWLING = 0, 1, 2, 3, 4, 5, 6
 # Steps per second of movement, at least for one second, after which the solver gives up.
 MOST_STEPS = 1e6
+# A solve that may change its method crawls if so many steps, as long as accuracy and stability allow, reach less far
+# than so long (s).
+WATCHED, LEAST_WAY = 1000, 0.02
 
 
 @inner
@@ -107,7 +110,8 @@ def fill(t, h, row, times, out, method, work, problem):
 def integrate(method_, problem_, control_, stops, scale, y, times, out):
     """Advance y [states] in place from `control.start`, or where it paused, to `control.end`; a status.
 
-    STRUCK behind an impact at `control.time` that has jolted a joint by more than `control.jolt`.
+    STRUCK behind an impact at `control.time` that has jolted a joint by more than `control.jolt`. CRAWLING if
+    `control.watched` and the steps are small; the solve may go on with another method, as if it had paused.
 
     method_, problem_, control_: addresses of the records.
     stops: times (rising) that no step may cross: kinks of the input. scale: typical sizes of the states.
@@ -121,13 +125,19 @@ def integrate(method_, problem_, control_, stops, scale, y, times, out):
     state, start_rates = work[STATE], work[START_RATES]
     copy(y, state)
     copy(scale, work[SCALE])
-    rest = carray(numbers_at(control.rest), (problem.states,))
+    rest = carray(numbers_at(control.rest), (problem.states + 2, problem.states))
     struck = carray(numbers_at(control.struck), (problem.states,))
     row, stop = 0, 0
+    # Whether the slopes are those of the state.
     fresh = False
+    first_slope = STAGES + method.stages
+    end_slope = first_slope + problem.states + 1
     if control.paused:
         t, h, last_error = control.time, control.next_step, control.last_error
-        copy(rest, start_rates)
+        copy(rest[0], start_rates)
+        fresh = control.sloped != 0
+        if fresh:
+            work[first_slope:end_slope] = rest[1:]
     else:
         t = control.start
         while row < times.size and times[row] <= t:
@@ -141,6 +151,7 @@ def integrate(method_, problem_, control_, stops, scale, y, times, out):
         last_error = 1e-4
         control.steps = control.rejected = 0
         control.quiet_until = control.start
+        control.tried, control.way = 0, 0.0
     status = DONE
     while t < end:
         if control.rest != 0 and t >= control.pause:
@@ -149,6 +160,14 @@ def integrate(method_, problem_, control_, stops, scale, y, times, out):
         if control.steps + control.rejected > MOST_STEPS * max(1.0, span):
             status = TOO_MANY_STEPS
             break
+        if control.watched and control.tried >= WATCHED:
+            crawls = control.way < LEAST_WAY
+            control.tried, control.way = 0, 0.0
+            if crawls:
+                status = CRAWLING
+                break
+        control.tried += 1
+        control.way += h
         while stop < stops.size and stops[stop] <= t + 1e-15 * max(1.0, abs(t)):
             stop += 1
         barrier = min(end, stops[stop]) if stop < stops.size else end
@@ -156,11 +175,11 @@ def integrate(method_, problem_, control_, stops, scale, y, times, out):
         clipped = t + 1.0000001 * h >= barrier
         if clipped:
             h = barrier - t
-        if h < 1e-14 * max(1.0, abs(t)) and not clipped:
+        if h < 1e-14 * max(1e-4, abs(t)) and not clipped:
             status = STEP_TOO_SMALL
             break
         if method.implicit and not fresh:
-            evaluate(problem.jacobian, t, state, problem, work[STAGES + method.stages])
+            evaluate(problem.jacobian, t, state, problem, work[first_slope])
             fresh = True
         take_step(t, h, method, work, control, problem)
         error = control.error
@@ -171,17 +190,20 @@ def integrate(method_, problem_, control_, stops, scale, y, times, out):
             h = after_error(h, control, method)
             control.rejected += 1
             continue
-        control.event = NOTHING
+        control.event, whole = NOTHING, True
         if problem.joints > 0:
             invoke(method.find_event, t, h, method, work, control, problem)
-            clipped = clipped and control.next_step == h
+            whole = control.next_step == h
+            clipped = clipped and whole
             h = control.next_step
         event = control.event != NOTHING
         row = fill(t, h, row, times, out, method, work, problem)
         t = barrier if clipped and not event else t + h
         copy(work[NEW_STATE], state)
         control.steps += 1
-        fresh = False
+        fresh = method.implicit and whole and not event
+        if fresh:
+            work[first_slope:end_slope] = work[end_slope : end_slope + problem.states + 1]
         if event:
             watched = control.jolt > 0.0 and control.event == IMPACT
             if watched:
@@ -205,9 +227,12 @@ def integrate(method_, problem_, control_, stops, scale, y, times, out):
     control.time = t
     control.next_step = h
     control.last_error = last_error
-    control.paused = status == PAUSED
-    if status == PAUSED:
-        copy(start_rates, rest)
+    control.paused = status in (PAUSED, CRAWLING)
+    if control.paused:
+        copy(start_rates, rest[0])
+        control.sloped = fresh
+        if fresh:
+            rest[1:] = work[first_slope:end_slope]
     if status == DONE:
         while row < times.size:
             copy(y, out[row])

@@ -41,20 +41,23 @@ PROBLEM = whole_numbers(
 METHOD = whole_numbers("step", "between", "tableau", "stages", "implicit", "settle", "find_event", "take_effect")
 
 # Given: start, end: s. tolerance: of a step's error, relative to a state's size. longest: greatest step (s).
-# pause: time (s) at or behind which the solve pauses, at the end of a step; rest: address of the rates [states] that a
-# paused solve goes on with, 0 if it is never to pause.
+# pause: time (s) at or behind which the solve pauses, at the end of a step; rest: address of the rates and
+# slopes [states + 2, states] that a paused solve goes on with, 0 if it is never to pause.
 # jolt: the change of a velocity (rad/s) above which the solve ends behind an impact, 0 if it is never to; struck:
-# address of the state [states] before that impact, 0 likewise.
+# address of the state [states] before that impact, 0 likewise. watched: whether the solve pauses if its steps become
+# small.
 # Given and told: next_step: size of the step that comes next (s), chosen by the integrator if 0. paused: whether the
 # solve goes on where it paused.
 # Told: time: reached (s). rows: how many of the wanted times were reached. error: of the last step over its tolerance;
 # last_error: of the one before. steps, rejected: how many. event, joint: what ended the last step, and which joint.
-# quiet_until: until then no joint is released (s).
+# quiet_until: until then no joint is released (s). tried: steps since it was last judged whether the solve crawls; way:
+# how far they would reach (s). sloped: whether a paused solve knows the slopes.
 CONTROL = np.dtype(
     [
         *((name, np.float64) for name in ("start", "end", "tolerance", "longest", "pause", "jolt")),
-        *((name, np.float64) for name in ("next_step", "time", "error", "last_error", "quiet_until")),
+        *((name, np.float64) for name in ("next_step", "time", "error", "last_error", "quiet_until", "way")),
         *((name, np.int64) for name in ("steps", "rejected", "event", "joint", "rest", "paused", "rows", "struck")),
+        *((name, np.int64) for name in ("watched", "tried", "sloped")),
     ]
 )
 
@@ -70,14 +73,15 @@ FUNCTION = (f8, numbers, numbers, i8, i8, i8, numbers)
 
 # Rows of the array of a step [rows, n] of n states: at its start and its end, and for which the rates are asked;
 # their typical sizes; the rates at its start; then rates or increments of the method's stages. An implicit method has
-# n + 1 more rows for the slopes, as the problem's jacobian gives them at its start, and n + 1 for their factors.
+# n + 1 more rows for the slopes, as the problem's jacobian gives them at its start, n + 1 for those at its end, and
+# n + 1 for factors.
 STATE, NEW_STATE, STAGE_STATE, SCALE, START_RATES, STAGES = 0, 1, 2, 3, 4, 5
 
 
 @inner
 def work_rows(problem, method):
     """How many rows the array of a step has."""
-    return STAGES + method.stages + (2 * problem.states + 2) * method.implicit
+    return STAGES + method.stages + 3 * (problem.states + 1) * method.implicit
 
 
 @inner

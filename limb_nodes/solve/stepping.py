@@ -16,6 +16,7 @@ import numpy as np
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.records import Record
 from limb_nodes.model.limb import Limb
+from limb_nodes.solve.course import METHODS
 from limb_nodes.solve.explicit import EXPLICIT
 from limb_nodes.solve.failure import FAILURES, SolveError, fault_of
 from limb_nodes.solve.held import hold, predict
@@ -80,10 +81,13 @@ class MuscleStepper:
 
     def _start(self) -> None:
         """Fresh data, and the muscles alone as a problem of it."""
-        layout = self.model.layout
+        layout, program = self.model.layout, self.model.program
         self._data = self.model.new_data(1.0)
-        rates = self.model.program.muscle_rates_c.address if layout.states else 0
+        rates = program.muscle_rates_c.address if layout.states else 0
         self._problem = new_problem(layout.states, rates, layout.model, self._data)
+        self._method = METHODS[self.model.suited_method].free if layout.states else EXPLICIT.free
+        if self._method.implicit[0]:
+            self._problem.jacobian[0] = program.muscle_jacobian_c.address
 
     def adopt(self, model: WholeModel) -> None:
         """Go on with the numbers of another model that has the same program."""
@@ -188,7 +192,7 @@ class MuscleStepper:
         inputs = tick_input(last_drive, drive, next_drive, span)
         give_inputs(self._problem, inputs)
         scale = self.model.layout.state_scales
-        status = solve_tick(EXPLICIT.free, self._problem, self._control, scale, self.internal, period)
+        status = solve_tick(self._method, self._problem, self._control, scale, self.internal, period)
         if status != DONE:
             raise SolveError(f"{self.model.limb.file}: the muscles cannot be advanced: {FAILURES[status]}")
 

@@ -32,8 +32,10 @@ TOLERANCE = 1e-9
 # compiled for one solve.
 TABLE_PAYS = 2_000
 TABLE_PAYS_ONCE = 1_000_000
-# Rate (1/s) from which steps that accuracy allows would be unstable with the explicit method.
-STIFF = 2000.0
+# Rate (1/s) from which the implicit method's longer steps outweigh that each costs more.
+STIFF = 6000.0
+# How far each internal state is moved, over its typical size, to see how stiff tendons are that pull.
+STRETCH = 0.1
 # Numbers of a part of a movement that is solved piece by piece, and most of its instants.
 PART, LONGEST_PART = 2**18, 2048
 
@@ -157,21 +159,28 @@ class WholeModel:
         return out[:-1].T
 
     def stiffness(self) -> float:
-        """Fastest rate (1/s) of the limb at its start with all muscles fully excited.
+        """Fastest rate (1/s) of the limb at its start, with all muscles fully excited or with none, whose tendons pull.
 
         By differences: the program of the exact slopes need not be compiled to find that it is not
         needed.
         """
-        state = self.initial_state()
+        start = self.initial_state()
+        pulling = start.copy()
+        pulling[2 * self.layout.joints :] += STRETCH * self.layout.state_scales
+        # What no muscle force damps is as fast as its own damper lets it be.
+        rates = [self._fastest(start, 1.0), self._fastest(pulling, 0.0)]
+        # Of rates at the start that are not finite the solve itself tells; the other posture is none of the limb's.
+        return max(rates) if math.isfinite(rates[1]) else rates[0]
+
+    def _fastest(self, state: FloatArray, excitation: float) -> float:
+        """The fastest rate (1/s) at a state, all muscles equally excited; infinite if a slope is not finite."""
         slopes = np.empty((state.size, state.size))
-        inputs = pieces(self.drives(np.ones((1, self.layout.muscles))))
+        inputs = pieces(self.drives(np.full((1, self.layout.muscles), excitation)))
         data = self.new_data(1.0)
         problem = self.problem(data)
         give_inputs(problem, inputs)
         difference_slopes(problem.address, state, self.state_scale, slopes)
-        if not np.isfinite(slopes).all():
-            return math.inf  # the solve itself says where and why
-        return float(np.abs(np.linalg.eigvals(slopes)).max())
+        return float(np.abs(np.linalg.eigvals(slopes)).max()) if np.isfinite(slopes).all() else math.inf
 
     @cached_property
     def suited_method(self) -> str:
@@ -318,12 +327,14 @@ class WholeModel:
             steps=steps,
         )
 
-    def solve(self, stretch: Stretch, tolerance: float, method: str) -> tuple[FloatArray, tuple[int, int]]:
+    def solve(
+        self, stretch: Stretch, tolerance: float, method: str, may_change: bool
+    ) -> tuple[FloatArray, tuple[int, int]]:
         """States [T, states] at the times of a stretch, and the accepted and rejected steps.
 
-        tolerance, method: as for `simulate`. Raises SolveError.
+        tolerance, method: as for `simulate`. may_change: as for `Course`. Raises SolveError.
         """
-        course = Course(self, float(stretch.times[-1]), stretch.period, tolerance, method)
+        course = Course(self, float(stretch.times[-1]), stretch.period, tolerance, method, may_change)
         states = course.advance(stretch)
         if course.failure is not None:
             raise course.failure
