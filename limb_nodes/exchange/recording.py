@@ -89,9 +89,11 @@ class RecordingPart(Part):
     @property
     def complete(self) -> int:
         """The newest tick that is there on every topic, -1 before the first."""
-        return min(
-            self.newest(topic) + every - 1 if self.newest(topic) >= 0 else -1 for topic, every in self.awaited_topics
-        )
+        return min(self.covered(topic, every) for topic, every in self.awaited_topics)
+
+    def covered(self, topic: str, every: int) -> int:
+        """The tick up to which a topic with a message every so many ticks is there, -1 before the first."""
+        return self.newest(topic) + every - 1 if self.counts[topic] else -1
 
     @property
     def awaited_topics(self) -> list[tuple[str, int]]:
@@ -115,5 +117,5 @@ class RecordingPart(Part):
         if self.unknown:
             return f"the parameters of {', '.join(self.unknown)}"
         tick = self.complete + 1
-        topic = next(topic for topic, every in self.awaited_topics if self.newest(topic) + every - 1 < tick)
+        topic = next(topic for topic, every in self.awaited_topics if self.covered(topic, every) < tick)
         return f"{topic} of tick {tick} from {SENDERS[topic]}"
