@@ -24,6 +24,7 @@ from typing import Any
 
 from limb_nodes import cli, commands
 from limb_nodes.levels import CONTRACTS, REGISTRY, Law, Parameter, motor_unit, sarcomere
+from limb_nodes.levels.equation import Equation, State
 from limb_nodes.model import load
 from limb_nodes.model.report_laws import is_of_report
 from limb_nodes.model.spanning import READERS
@@ -171,9 +172,17 @@ def law_sections() -> str:
 
 def law_section(name: str, law: Law) -> str:
     """A law: its equations, states and parameters."""
+    alike: dict[str, list[Equation]] = {}
+    for item in law.equations:
+        alike.setdefault(item.number, []).append(item)
     rows = [
-        (item.number, f"`{item.defines}`", first_line(item.function), ", ".join(f"`{use}`" for use in item.uses) or "-")
-        for item in law.equations
+        (
+            number,
+            first_to_last([item.defines for item in items]),
+            first_line(items[0].function),
+            ", ".join(f"`{use}`" for use in items[0].uses) or "-",
+        )
+        for number, items in alike.items()
     ]
     parts = [
         f"### {law.process}: {name}",
@@ -181,14 +190,28 @@ def law_section(name: str, law: Law) -> str:
         table(("equation", "defines", "meaning", "uses"), rows),
     ]
     if law.states:
+        begins: dict[tuple[str, str, str], list[State]] = {}
+        for state in law.states:
+            begins.setdefault((state.unit, state.initial, state.number), []).append(state)
         rows = [
-            (f"`{state.name}`", state.unit, f"`{state.rate}`", f"`{state.initial}`", state.number)
-            for state in law.states
+            (
+                first_to_last([state.name for state in states]),
+                unit,
+                first_to_last([state.rate for state in states]),
+                f"`{initial}`",
+                number,
+            )
+            for (unit, initial, number), states in begins.items()
         ]
         parts += ["States:", table(("state", "unit", "rate", "starts at", "equation"), rows)]
     if law.parameters:
         parts += ["Parameters:", parameter_table(law.parameters)]
     return "\n\n".join(parts)
+
+
+def first_to_last(names: list[str]) -> str:
+    """The first and the last of names that mean the same, and how many there are."""
+    return f"`{names[0]}`" if len(names) == 1 else f"`{names[0]}` to `{names[-1]}` ({len(names)})"
 
 
 def parameter_table(parameters: Iterable[Parameter], source: bool = True) -> str:
