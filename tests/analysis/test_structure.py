@@ -517,3 +517,25 @@ def test_a_terminal_without_symbols_gets_letters(monkeypatch):
 
     monkeypatch.setattr(structure.sys, "stdout", Plain())
     assert structure.printable("⊗ × θ_penn → v_T") == "O x theta_penn > v_T"
+
+
+def test_the_tissue_of_joints_is_there(tmp_path):
+    """Each law's moment in the sum of the joint's torques, by angle and velocity as far as it uses them."""
+    text = (PARAMS / "reference_joint.yaml").read_text()
+    angle = "    angle: 0.5235987755982988"
+    assert text.count(angle) == 1
+    ends = "upper_angle: 1.0, upper_growth: 5.0, lower_angle: -1.0, lower_growth: 5.0"
+    tissue = f"[{{law: exponential, {ends}}}, {{law: linear, stiffness: 1.0, damping: 0.1}}]"
+    (tmp_path / "limb.yaml").write_text(text.replace(angle, f"    tissue: {tissue}\n{angle}"))
+    found = {one.name: one for one in equation_sets(load_limb(tmp_path / "limb.yaml"))}
+    plain = {one.name: one for one in equation_sets(load_limb(PARAMS / "reference_joint.yaml"))}
+    for level in ("limb_original", "model"):
+        relations = found[level].relations
+        moments = [relation for relation in relations if relation.defines.variable.name == "passive_moment"]
+        assert len(moments) == 2
+        (total,) = (relation for relation in relations if relation.number == "2.61")
+        assert {relation.defines for relation in moments} <= set(total.uses)
+        assert all("joint_angle" in {term.variable.name for term in relation.uses} for relation in moments)
+        assert len(relations) == len(found[level].unknowns)
+        assert found[level].inputs == plain[level].inputs
+    assert found["limb_original"].laws == {"tissue": "exponential, linear"}

@@ -9,7 +9,8 @@ from limb_nodes.analysis.structure.relations import Assembly, Relation, Term, Va
 from limb_nodes.levels.equation import ScalarFunction, equation_of
 from limb_nodes.levels.limb import chain, original, transformed
 from limb_nodes.model import Limb
-from limb_nodes.model.system import crossings_of
+from limb_nodes.model.limb import Segment
+from limb_nodes.model.system import crossings_of, tissue_system
 
 ORIGINAL, TRANSFORMED, INTERFACE = "limb_original", "limb_transformed", "limb_interface"
 TIP_FORCE = {name: (Term(Variable("", name)),) for name in ("tip_force_x", "tip_force_y")}
@@ -71,7 +72,9 @@ def interface(limb: Limb, level: str) -> list[Relation]:
             if joint == k
         )
         (torque,) = of(segment.name, "joint_torque")
-        relations.append(Relation("2.61", segment.name, level, torque, torques))
+        tissue = tissue_relations(segment, level)
+        passive = tuple(one.defines for one in tissue if one.defines.variable.name == "passive_moment")
+        relations += [Relation("2.61", segment.name, level, torque, torques + passive), *tissue]
         for item, angle in (
             (original.joint_angle, "segment_angle"),
             (original.joint_velocity, "segment_velocity"),
@@ -82,6 +85,27 @@ def interface(limb: Limb, level: str) -> list[Relation]:
             relations.append(relate(equation, level, segment.name, defined, given))
         previous = segment.name
     return relations
+
+
+def tissue_relations(segment: Segment, level: str) -> list[Relation]:
+    """The equations of the tissue of a segment's joint; each law's variables have an owner of their own."""
+    relations = []
+    for number, chosen in enumerate(segment.tissue):
+        owner = f"{segment.name}.tissue{number}"
+        system = tissue_system(chosen.law)
+        defined = {bound.defines for bound in system.equations}
+        for bound in system.equations:
+            owners = dict.fromkeys(defined, owner) | dict.fromkeys(system.inputs, segment.name)
+            uses = tuple(Term(Variable(owners[name], name)) for name in bound.symbols if name in owners)
+            defines = Term(Variable(owner, bound.defines))
+            relations.append(Relation(bound.equation.number, owner, level, defines, uses, bound.process))
+    return relations
+
+
+def tissue_laws(limb: Limb) -> dict[str, str]:
+    """Names of all laws of the joints' tissue by process."""
+    names = dict.fromkeys(chosen.law.name for segment in limb.segments for chosen in segment.tissue)
+    return {"tissue": ", ".join(names)} if names else {}
 
 
 def original_assembly(limb: Limb) -> Assembly:

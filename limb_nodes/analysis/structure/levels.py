@@ -35,9 +35,9 @@ def equation_sets(limb: Limb, level: str | None = None) -> list[EquationSet]:
     """
     assembly = muscles.muscle_assembly(limb)
     sets = [*sets_of_units(limb, assembly), *sets_of_muscles(limb, assembly)]
-    joints = limb.joint_names
+    joints, laws = limb.joint_names, chain.tissue_laws(limb)
     original = chain.original_assembly(limb)
-    sets.append(original.view(chain.ORIGINAL, TITLES[chain.ORIGINAL], [chain.ORIGINAL], members=joints))
+    sets.append(original.view(chain.ORIGINAL, TITLES[chain.ORIGINAL], [chain.ORIGINAL], laws=laws, members=joints))
     transformed = Assembly()
     for relation in chain.transformed_relations(limb):
         transformed.add(relation)

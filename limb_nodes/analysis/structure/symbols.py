@@ -66,6 +66,7 @@ SYMBOLS = {
     "segment_angle": "α^s",
     "segment_velocity": "ω^s",
     "joint_torque": "M_L",
+    "passive_moment": "M_P",
     "tip_torque": "M_load",
 } | {
     f"{name}_{axis}": symbol
