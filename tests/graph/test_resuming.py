@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from limb_nodes.bags.read import BagReader
+from limb_nodes.exchange.recorded import RecordedRun
 from limb_nodes.foundation.topics import NODES
 from tests.graph.conftest import children_of
 
@@ -98,8 +99,10 @@ def test_a_node_that_is_stopped_is_named_and_goes_on_with_the_run(begun, undistu
     assert bags.differences(undisturbed, out) == []
 
 
-def test_a_run_that_stands_still_ends_in_order(begun):
+def test_a_run_that_stands_still_ends_in_order(begun, until):
     child, out = begun("--processes", "--stall-limit", "3")
+    # What a stopped node has not delivered yet cannot be recorded, up to as many ticks as the limb may be ahead.
+    until(lambda: RecordedRun.read(str(out)).past().complete > 100 or not child.running(), "100 ticks on disk")
     os.kill(node(child, "muscle_stack"), signal.SIGSTOP)
     assert child.wait() == 1
     assert "limb: error: " in child.all_said
