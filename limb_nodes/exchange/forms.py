@@ -19,6 +19,7 @@ from limb_nodes.foundation.topics import TOPIC_TYPES
 from limb_nodes.model import Limb
 from limb_nodes.model.layout import build_layout
 from limb_nodes.model.points import point_names
+from limb_nodes.solve.delay import DelayLine, delays_of
 from limb_nodes.solve.fits import OTHER_FORM, OTHER_NUMBERS, fits
 from limb_nodes.solve.outputs import MUSCLE_FIELDS, SARCOMERE_FIELDS, UNIT_FIELDS
 
@@ -90,8 +91,8 @@ class Form:
         return int(self.values(data, name))
 
 
-def forms_of(limb: Limb) -> dict[str, Form]:
-    """The forms of all topics of a run of a limb, by topic."""
+def forms_of(limb: Limb, rate: float) -> dict[str, Form]:
+    """The forms of all topics of a run of a limb, by topic. rate: ticks per second (Hz)."""
     joints, muscles, points = limb.joint_names, limb.muscle_names, point_names(limb)
     of_unit = {
         "muscle": [muscle.name for muscle in limb.muscles for _ in muscle.units],
@@ -104,6 +105,7 @@ def forms_of(limb: Limb) -> dict[str, Form]:
     }
     units, layout = len(of_unit["unit"]), build_layout(limb)
     remembered = layout.states + layout.scratch + 2 * (layout.joints + layout.drives) + 1
+    remembered += DelayLine(delays_of(limb, rate)).remembered.size
     corner = make_message("geometry_msgs/msg/Point")
     fields: dict[str, dict[str, Any]] = {
         "activation": {"name": muscles, **zeros(["activation"], len(muscles))},

@@ -15,6 +15,7 @@ from limb_nodes.exchange.past import Past
 from limb_nodes.exchange.stream import CHECKPOINT
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.topics import STATES
+from limb_nodes.solve.delay import DelayLine, delays_of
 from limb_nodes.solve.outputs import STATE_FIELDS, TORQUE_FIELDS
 from limb_nodes.solve.small import finite
 from limb_nodes.solve.stepping import MuscleStepper
@@ -37,6 +38,7 @@ class MusclePart(Part):
         self.state_every = state_every
         self.tell_ranges: Callable[[], None] = lambda: None
         self.stepper = MuscleStepper(self.limb)
+        self.delays = DelayLine(delays_of(self.limb, self.ticks.rate))
         n, muscles = len(self.limb.segments), len(self.limb.muscles)
         self.tick = self.last_tick = -1
         self.angle, self.velocity = np.zeros(n), np.zeros(n)
@@ -69,8 +71,8 @@ class MusclePart(Part):
         """Keep the activation of a tick."""
         self.last_tick = self.forms["activation"].number(data, "last_tick")
         values = self.values("activation", data, "activation").astype(np.float64)
-        self.excitation = values
-        self.inputs[tick] = values, self.stepper.drive(values)
+        self.excitation = self.delays.reach(tick, values)
+        self.inputs[tick] = self.excitation, self.stepper.drive(self.excitation)
 
     def limb_state(self, topic: str, data: bytes) -> tuple[FloatArray, FloatArray]:
         """Angles and velocities of a message of a topic."""
@@ -186,7 +188,7 @@ class MusclePart(Part):
         has_last = self.last_drive is not None
         last_drive = self.last_drive if self.last_drive is not None else np.zeros_like(self.drive)
         parts = self.stepper.remembered, self.angle, self.velocity, self.drive, last_drive, [float(has_last)]
-        self.checkpoint.values["state"][:] = np.concatenate(parts)
+        self.checkpoint.values["state"][:] = np.concatenate([*parts, self.delays.remembered])
         self.checkpoint.publish(self.tick)
 
     def go_on_after(self, past: Past) -> None:
@@ -195,9 +197,10 @@ class MusclePart(Part):
             self.tick, data = past.muscles
             state = self.values("muscle_checkpoint", data, "state").astype(np.float64)
             parts = self.stepper.remembered, self.angle, self.velocity, self.drive, self.drive
-            sizes = [part.size for part in parts]
-            remembered, self.angle, self.velocity, self.drive, last, has_last = np.split(state, np.cumsum(sizes))
+            ends = np.cumsum([*(part.size for part in parts), 1])
+            remembered, self.angle, self.velocity, self.drive, last, has_last, delays = np.split(state, ends)
             self.stepper.remember(remembered)
+            self.delays.remember(delays)
             self.last_drive = last if has_last[0] else None
         activations = past.messages["activation"]
         for tick in range(self.tick + 1, past.tick + 1):

@@ -29,7 +29,7 @@ class Part:
 
     def __init__(self, limb: Limb, ticks: Ticks, identity: str = "", realtime: bool = False) -> None:
         self.limb, self.ticks, self.realtime = limb, ticks, realtime
-        self.forms: dict[str, Form] = forms_of(limb)
+        self.forms: dict[str, Form] = forms_of(limb, ticks.rate)
         self.identity, self._own = "", b""
         self.outgoing: dict[str, Outgoing] = {}
         self.streams: dict[str, Stream] = {}

@@ -49,7 +49,7 @@ class Muscle:
 
     joints: those that it crosses, from proximal to distal.
     role: +1 for a flexor (pulls the joint angle up), -1 for an extensor, 0 if the signs of moment arms tell it.
-    laws: by process: path, tendon, aponeurosis, activation_dynamics.
+    laws: by process: path, tendon, aponeurosis, activation_dynamics. delay: from the excitation to the muscle (s).
     """
 
     name: str
@@ -59,6 +59,7 @@ class Muscle:
     laws: dict[str, ChosenLaw]
     units: tuple[MotorUnit, ...]
     place: str
+    delay: float = 0.0
 
 
 @dataclass(frozen=True)

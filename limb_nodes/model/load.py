@@ -76,6 +76,15 @@ ACTIVATION_THRESHOLD = Parameter(
     minimum=0.0,
     below=1.0,
 )
+DELAY = Parameter(
+    "delay",
+    "s",
+    "electromechanical delay, from the excitation to the muscle",
+    0.0,
+    "depends on the muscle; 0.03 to 0.06 in people",
+    minimum=0.0,
+    maximum=1.0,
+)
 COUNT = Parameter("count", "1", "number of such units", 1.0, "depends on the muscle", 1.0, 10000.0, integer=True)
 ORDER = Parameter("order", "1", "place in the recruitment order, R_F", 0.0, "position in the list")
 ROLES = {"flexor": 1.0, "extensor": -1.0}
@@ -217,7 +226,7 @@ def read_muscle(
     """One entry of `muscles`."""
     name = section.text("name")
     crossed = Crossed(segments, read_joints(section, segments))
-    threshold = present(section.number(ACTIVATION_THRESHOLD))
+    threshold, delay = present(section.number(ACTIVATION_THRESHOLD)), present(section.number(DELAY))
     path = read_path(section, crossed, code)
     # The signs of the moment arms tell it where a path has one for each joint.
     role = 0.0
@@ -242,7 +251,7 @@ def read_muscle(
     for place, (unit, unit_threshold) in enumerate(zip(ordered, thresholds, strict=True), 1):
         unit.values["unit_threshold"] = unit_threshold
         unit.values["unit_rank"] = place / len(ordered)
-    return Muscle(name, crossed.joints, role, threshold, laws, tuple(ordered), section.place)
+    return Muscle(name, crossed.joints, role, threshold, laws, tuple(ordered), section.place, delay)
 
 
 def read_path(section: Section, crossed: Crossed, code: UserCode | None) -> ChosenLaw:

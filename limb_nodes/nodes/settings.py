@@ -21,6 +21,7 @@ from limb_nodes.nodes.live_readers import reader
 from limb_nodes.nodes.live_settings import HEARD, LiveSettings
 from limb_nodes.nodes.running import check_namespace
 from limb_nodes.signals.activation import load_activation
+from limb_nodes.solve.delay import refuse_long_delays
 from limb_nodes.solve.ranges import OUT_OF_RANGE
 
 # Longest run (s).
@@ -124,6 +125,7 @@ def checked(settings: RunSettings) -> tuple[RunSettings, int | None]:
     if source:
         activation = load_activation(source, limb.muscle_names, settings.rate, settings.duration or None)
         final = len(activation.values) - 1
+        refuse_long_delays(limb, activation.duration)
         source = str(Path(source).resolve()) if Path(source).exists() else source
         for name, value in asdict(settings.live).items():
             if value != getattr(LiveSettings(), name):

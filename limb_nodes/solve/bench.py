@@ -230,6 +230,8 @@ class MuscleBench:
         velocity = np.diff(length) / np.diff(time)
         before, after = (velocity, velocity) if rate is None else (rate[:-1], rate[1:])
         shown = np.append(velocity, velocity[-1]) if rate is None else rate
+        (muscle,) = self.model.limb.muscles
+        excitation = np.interp(time - muscle.delay, time, excitation)
         drives = self.model.drives(excitation[:, np.newaxis])
         stepper = self.stepper
         stepper.internal = self._initial(initial, float(length[0]), float(excitation[0]))

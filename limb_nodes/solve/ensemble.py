@@ -20,6 +20,7 @@ from limb_nodes.model.limb import Limb
 from limb_nodes.model.load import build_limb
 from limb_nodes.model.user_code import UserCode
 from limb_nodes.solve.course import METHODS, Stretch, stretch_of
+from limb_nodes.solve.delay import delayed, delays_of, refuse_long_delays
 from limb_nodes.solve.variants import Values, Variants
 from limb_nodes.solve.whole import TOLERANCE, Movement, WholeModel
 
@@ -84,7 +85,9 @@ class SampleSolver:
 
     def prepared(self, model: WholeModel) -> Stretch:
         """The whole input, and the times that are asked for."""
-        drives = model.drives(self.order.excitation)
+        given, limb = self.order.excitation, model.limb
+        refuse_long_delays(limb, (len(given) - 1) * self.period)
+        drives = model.drives(delayed(given, delays_of(limb, self.order.rate), 0, len(given)))
         return stretch_of(drives, 0, self.times, self.period, 0, len(drives))
 
     def solve(self, values: Values) -> Any:
@@ -125,6 +128,7 @@ class Ensemble:
             raise FieldError("excitation", f"has the shape {shape}; [two or more, {muscles}] is needed", limb.file)
         if not rate > 0.0:
             raise FieldError("rate", f"is {rate:g}; a number > 0 in Hz is needed", limb.file)
+        refuse_long_delays(limb, (len(self.excitation) - 1) / rate)
         if method != "auto" and method not in METHODS:
             raise FieldError("method", f"is {method!r}; auto or {' or '.join(METHODS)} is needed", limb.file)
 

@@ -118,6 +118,8 @@ class Variants:
         """Whether an input does the same to the motor units of a model as to those of the base."""
         if model.program is not self.base.program:
             return False
+        if any(one.delay != other.delay for one, other in zip(model.limb.muscles, self.limb.muscles, strict=True)):
+            return False
         new, old = model.layout.model.parameters, self.base.layout.model.parameters
         return bool(np.array_equal(new[self.driving], old[self.driving]))
 

@@ -19,6 +19,7 @@ from limb_nodes.model.limb import Limb
 from limb_nodes.solve.compile import compiled
 from limb_nodes.solve.course import Course, Input, Stretch, stretches
 from limb_nodes.solve.data import data_type
+from limb_nodes.solve.delay import delayed, delays_of, refuse_long_delays
 from limb_nodes.solve.drive_table import DriveTable
 from limb_nodes.solve.failure import FAILURES, SolveError, where
 from limb_nodes.solve.integrate import NOT_FINITE, difference_slopes
@@ -196,9 +197,9 @@ class WholeModel:
         """What the input [T, muscles] does to muscles and motor units [T, drives]."""
         return self._drives(excitation, len(excitation))
 
-    def _drives_of(self, excitation: Input, start: int, end: int) -> FloatArray:
-        """The drives of a part of an input."""
-        return self._drives(excitation[start:end], len(excitation))
+    def _drives_of(self, excitation: Input, delays: FloatArray, start: int, end: int) -> FloatArray:
+        """The drives of a part of an input, as it reaches the muscles."""
+        return self._drives(delayed(excitation, delays, start, end), len(excitation))
 
     def _drives(self, excitation: FloatArray, count: int) -> FloatArray:
         """The drives of a part of an input of `count` samples."""
@@ -226,13 +227,13 @@ class WholeModel:
     ) -> Movement:
         """Solve over the span of an input.
 
-        excitation: [T, muscles], sampled at `rate` Hz from t = 0; what it does to the motor units
-            is smooth between samples, but for corners (`limb_nodes.solve.pieces`).
+        excitation: [T, muscles], sampled at `rate` Hz from t = 0, before the muscles' delays; what it does to the
+            motor units is smooth between samples, but for corners (`limb_nodes.solve.pieces`).
         tolerance: of the local error, relative to the state or its typical size.
         method: "explicit", "implicit", or "auto", which chooses by `stiffness`.
         observe: whether to fill in accelerations and what muscles and motor units show; if not,
             those have no rows.
-        Raises SolveError if the equations cannot be solved further.
+        Raises SolveError if the equations cannot be solved further, UserError if a delay is longer than the input.
         """
         (movement,) = self._parts(excitation, rate, len(excitation), tolerance, method, observe)
         return movement
@@ -261,17 +262,20 @@ class WholeModel:
     ) -> Iterator[Movement]:
         """The movement in parts of so many instants, or somewhat more."""
         period, count = 1.0 / rate, len(excitation)
+        refuse_long_delays(self.limb, (count - 1) * period)
+        delays = delays_of(self.limb, rate)
         course = Course(self, (count - 1) * period, period, tolerance, method)
         # The search for the fibre force starts at that of the instant before: two records, each for one kind of search.
         seen = self.new_data(period), self.new_data(period)
-        drives = partial(self._drives_of, excitation)
+        drives = partial(self._drives_of, excitation, delays)
         done = 0
         for stretch, pause in stretches(drives, count, period, rows, course):
             states = course.advance(stretch, pause)
             given = excitation[done : done + len(states)]
+            reaching = delayed(excitation, delays, done, done + len(states))
             done += len(states)
             if len(states):
-                movement = self._movement(stretch, states, given, seen if observe else (), course.steps)
+                movement = self._movement(stretch, states, given, reaching, seen if observe else (), course.steps)
                 # Finite states may have a rate that is not, which no step has met.
                 unknown = np.flatnonzero(~np.isfinite(movement.acceleration).all(axis=1))
                 if unknown.size:
@@ -291,10 +295,14 @@ class WholeModel:
         stretch: Stretch,
         states: FloatArray,
         excitation: FloatArray,
+        reaching: FloatArray,
         seen: tuple[Record, ...],
         steps: tuple[int, int],
     ) -> Movement:
-        """The states [T, states] from the first time of a stretch on as a movement; seen: data to observe it with."""
+        """The states [T, states] from the first time of a stretch on as a movement.
+
+        reaching: the excitation as it reaches the muscles. seen: data to observe them with.
+        """
         n, layout, times = self.layout.joints, self.layout, stretch.times[: len(states)]
         shown = len(states) if seen else 0
         acceleration = np.empty((shown, n))
@@ -307,7 +315,7 @@ class WholeModel:
             self.program.accelerations(
                 times, states, stretch.inputs, layout.model.address, moving.address, acceleration
             )
-            given = np.ascontiguousarray(excitation, dtype=np.float64)
+            given = np.ascontiguousarray(reaching, dtype=np.float64)
             records = layout.model.address, still.address
             self.program.observe_all(states, given, *records, muscle, crossing, unit)
         return Movement(

@@ -25,7 +25,7 @@ TICKS = st.integers(0, 12)
 
 @cache
 def forms() -> dict[str, Form]:
-    return forms_of(load_limb(LIMB))
+    return forms_of(load_limb(LIMB), 500.0)
 
 
 def message(tick: int, value: float = 0.25, topic: str = "joint_torque") -> bytes:

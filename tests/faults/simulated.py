@@ -115,15 +115,16 @@ def shared(lag: int = stream_module.RECORDER_LAG) -> Iterator[None]:
         yield
 
 
-def once_for_each(make: Callable[[Limb], Any]) -> Callable[[Limb], Any]:
-    """The same result for the same object; equal limbs are too long to compare."""
-    made: dict[int, tuple[Limb, Any]] = {}
+def once_for_each(make: Callable[..., Any]) -> Callable[..., Any]:
+    """The same result for the same object and numbers; equal limbs are too long to compare."""
+    made: dict[tuple[Any, ...], tuple[Limb, Any]] = {}
 
     @functools.wraps(make)
-    def known(limb: Limb) -> Any:
-        if id(limb) not in made:
-            made[id(limb)] = limb, make(limb)
-        return made[id(limb)][1]
+    def known(limb: Limb, *numbers: float) -> Any:
+        key = (id(limb), *numbers)
+        if key not in made:
+            made[key] = limb, make(limb, *numbers)
+        return made[key][1]
 
     return known
 
@@ -630,7 +631,7 @@ class Run:
         """The messages of a stranger."""
         if fault.where == PROGRESS:
             return [(IDENTITY, int(fault.what))]
-        form = forms_once(self.setting.limb)[fault.where]
+        form = forms_once(self.setting.limb, self.setting.ticks.rate)[fault.where]
         data = self.newest.get(fault.where, of_run(form, form.data, bytes_of(IDENTITY)))
         return FORGERS[fault.what](form, data, self.setting.ticks.nanoseconds)
 

@@ -317,8 +317,14 @@ def test_limb_holds_every_alternative(limb):
         ("aponeurosis", "none"),
         ("aponeurosis", "constant_area"),
     }
-    # In a limb of its own, for its many states.
-    elsewhere = {("sarcomere", "huxley_distribution")}
+    # In limbs of their own.
+    elsewhere = {
+        ("sarcomere", "huxley_distribution"),
+        ("force_length", "cheng_optimal_length"),
+        ("force_frequency", "twitch_tetanus"),
+        ("activation_dynamics", "second_order"),
+        ("activation_dynamics", "second_order_logarithmic"),
+    }
     of_muscles = [process for process, contract in CONTRACTS.items() if contract.owner != "joint"]
     assert {(process, name) for process in of_muscles for name in REGISTRY[process]} - chosen == by_report | elsewhere
 

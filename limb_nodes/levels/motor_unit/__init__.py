@@ -2,6 +2,7 @@
 
 from limb_nodes.levels.motor_unit import (
     activation_frequency,
+    cheng_optimal_length,
     exponential_passive_force,
     force_frequency,
     force_length,
@@ -9,6 +10,7 @@ from limb_nodes.levels.motor_unit import (
     gordon_huxley_julian,
     passive_force,
     recruitment,
+    twitch_tetanus,
 )
 from limb_nodes.levels.motor_unit.fibre import EQUATIONS, PARAMETERS
 
@@ -16,6 +18,7 @@ __all__ = [
     "EQUATIONS",
     "PARAMETERS",
     "activation_frequency",
+    "cheng_optimal_length",
     "exponential_passive_force",
     "force_frequency",
     "force_length",
@@ -23,4 +26,5 @@ __all__ = [
     "gordon_huxley_julian",
     "passive_force",
     "recruitment",
+    "twitch_tetanus",
 ]

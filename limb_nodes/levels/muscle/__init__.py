@@ -7,6 +7,7 @@ from limb_nodes.levels.muscle import (
     first_order,
     geometric_path,
     path,
+    second_order,
     tendon,
     toe_region,
 )
@@ -21,6 +22,7 @@ __all__ = [
     "geometric_path",
     "muscle_equations",
     "path",
+    "second_order",
     "tendon",
     "toe_region",
 ]
