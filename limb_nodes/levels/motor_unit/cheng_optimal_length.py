@@ -16,7 +16,7 @@ def force_length_factor(
     sarcomere_length: float, optimal_sarcomere_length: float, omega: float, beta: float, rho: float
 ) -> float:
     """Force-length factor (1): a skewed bell with its top at the optimal length."""
-    relative = sarcomere_length / optimal_sarcomere_length
+    relative = max(0.0, sarcomere_length / optimal_sarcomere_length)
     return math.exp(-(abs((relative**beta - 1.0) / omega) ** rho))
 
 
