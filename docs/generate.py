@@ -122,7 +122,7 @@ def key_tables() -> dict[str, str]:
     return {
         "limb-keys": parameter_table((load.BASE_ANGLE, load.TIP_TORQUE), source=False),
         "segment-keys": parameter_table(load.SEGMENT_PARAMETERS, source=False),
-        "muscle-keys": parameter_table((load.ACTIVATION_THRESHOLD,), source=False),
+        "muscle-keys": parameter_table((load.ACTIVATION_THRESHOLD, load.DELAY), source=False),
         "unit-keys": parameter_table((load.COUNT, load.ORDER, *motor_unit.PARAMETERS), source=False),
         "processes": process_table(),
         "waves": "\n\n".join(

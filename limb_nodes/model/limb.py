@@ -63,6 +63,14 @@ class Muscle:
 
 
 @dataclass(frozen=True)
+class Person:
+    """Whose limb it is. mass: kg. height: m."""
+
+    mass: float
+    height: float
+
+
+@dataclass(frozen=True)
 class Limb:
     """A limb. Angles in rad, lengths in m, forces in N, in the plane x right, y up.
 
@@ -81,6 +89,7 @@ class Limb:
     text: str = field(compare=False)
     content: dict[str, Any] = field(compare=False)
     code: UserCode = field(compare=False)
+    person: Person | None = None
 
     @property
     def joint_names(self) -> list[str]:

@@ -21,7 +21,7 @@ from limb_nodes.model.check_law import check_laws
 from limb_nodes.model.choice import choose_law, read_law
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.consent import require_consent
-from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Segment
+from limb_nodes.model.limb import Limb, MotorUnit, Muscle, Person, Segment
 from limb_nodes.model.path_remarks import warn_of_arms
 from limb_nodes.model.spanning import Crossed, over_joints, read_joints, read_spanning, spans
 from limb_nodes.model.system import crossings_of
@@ -84,6 +84,12 @@ DELAY = Parameter(
     "depends on the muscle; 0.03 to 0.06 in people",
     minimum=0.0,
     maximum=1.0,
+)
+PERSON_MASS = Parameter(
+    "mass", "kg", "of the person whose limb it is", source="depends on the person", minimum=2.0, maximum=400.0
+)
+PERSON_HEIGHT = Parameter(
+    "height", "m", "of the person whose limb it is", source="depends on the person", minimum=0.4, maximum=2.6
 )
 COUNT = Parameter("count", "1", "number of such units", 1.0, "depends on the muscle", 1.0, 10000.0, integer=True)
 ORDER = Parameter("order", "1", "place in the recruitment order, R_F", 0.0, "position in the list")
@@ -182,6 +188,7 @@ def build_limb(content: Any, file: str, text: str, code: UserCode | None = NO_CO
         tip_torque=present(top.number(TIP_TORQUE)),
         segments=segments,
         muscles=muscles,
+        person=read_person(top),
         file=file,
         text=text,
         content=content,
@@ -214,6 +221,16 @@ def read_segment(section: Section, code: UserCode | None) -> Segment:
     segment = Segment(name=name, joint=joint, joint_range=joint_range, tissue=tissue, **values)
     section.finish()
     return segment
+
+
+def read_person(top: Section) -> Person | None:
+    """Whose limb it is, if the file tells it."""
+    if not top.has("person"):
+        return None
+    section = top.section("person")
+    mass, height = section.number(PERSON_MASS), section.number(PERSON_HEIGHT)
+    section.finish()
+    return Person(present(mass), present(height))
 
 
 def read_muscle(
