@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,8 +36,8 @@ def refuse_long_delays(limb: Limb, duration: float) -> None:
             )
 
 
-def between(older: float, newer: float, part: float) -> float:
-    """The value at a part of the way from one sample to the next."""
+def between(older: Any, newer: Any, part: float) -> Any:
+    """The values, numbers or arrays, at a part of the way from one sample to the next."""
     return older + part * (newer - older) if part else older
 
 
@@ -50,9 +50,8 @@ def delayed(samples: Input, delays: Sequence[float] | FloatArray, start: int, en
         return known
     rows, out = np.arange(start, end), np.empty((end - start, len(back)))
     for muscle, (delay, steps) in enumerate(zip(delays, back, strict=True)):
-        part, column = steps - delay, known[:, muscle]
-        older = column[np.maximum(rows - steps, 0) - first]
-        out[:, muscle] = older + part * (column[np.maximum(rows - steps + 1, 0) - first] - older) if part else older
+        older, newer = (known[np.maximum(rows - back_to, 0) - first, muscle] for back_to in (steps, max(steps - 1, 0)))
+        out[:, muscle] = between(older, newer, steps - delay)
     return out
 
 
