@@ -62,9 +62,9 @@ def licence(name: str) -> str:
     classified = [
         text.rpartition(" :: ")[2] for text in about.get_all("Classifier") or [] if text.startswith("License")
     ]
-    text = about["License"] or ""
+    text = about.get("License", "")
     short = text if text and "\n" not in text and len(text) < 40 else ""
-    return about["License-Expression"] or short or ", ".join(classified) or "not declared"
+    return about.get("License-Expression", "") or short or ", ".join(classified) or "not declared"
 
 
 def rows() -> Iterator[tuple[str, str, str, str]]:

@@ -226,6 +226,7 @@ def read_segment(section: Section, code: UserCode | None) -> Segment:
 def read_person(top: Section) -> Person | None:
     """Whose limb it is, if the file tells it."""
     if not top.has("person"):
+        top.take("person")
         return None
     section = top.section("person")
     mass, height = section.number(PERSON_MASS), section.number(PERSON_HEIGHT)

@@ -166,12 +166,13 @@ def test_tangents_of_a_registered_law(law):
             values[state.name] = rng.uniform(low, high)
         for bound in waiting:
             function = bound.equation.function
-            given = {name: values[symbol] for name, symbol in zip(bound.equation.uses, bound.symbols, strict=True)}
+            names = bound.equation.arguments
+            given = {name: values[symbol] for name, symbol in zip(names, bound.symbols, strict=True)}
             values[bound.defines] = function(*given.values())
             if bound.process != law.process:
                 continue
             # Relative to its size, so that quantities of all magnitudes can be mixed.
-            varying = [n for n, symbol in zip(bound.equation.uses, bound.symbols, strict=True) if roots[symbol]]
+            varying = [n for n, symbol in zip(names, bound.symbols, strict=True) if roots[symbol]]
             sizes = {name: abs(given[name]) * rng.uniform(0.5, 2.0) for name in varying if given[name]}
             directions = [{name: size} for name, size in sizes.items()]
             if len(sizes) > 1:
