@@ -69,6 +69,11 @@ def parse_yaml(text: str, file: str, most_bytes: int = MOST_BYTES) -> Any:
         raise UserError(f"{file}: not YAML: a value does not fit its tag: {problem}") from None
 
 
+def placed_yaml(text: str) -> Any:
+    """Content of YAML text that `parse_yaml` has read before; it knows where its keys and values stand."""
+    return YAML().load(text)
+
+
 def yaml_text(content: Any) -> str:
     """The YAML text of plain data."""
     stream: io.StringIO = io.StringIO()

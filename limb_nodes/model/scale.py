@@ -11,9 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from ruamel.yaml import YAML
-
 from limb_nodes.errors import UserError
+from limb_nodes.foundation.yaml_text import placed_yaml
 from limb_nodes.levels import CONTRACTS
 from limb_nodes.model.chosen import ChosenLaw
 from limb_nodes.model.limb import Limb, Person
@@ -88,7 +87,7 @@ def scaled_text(limb: Limb, mass: float | None, height: float | None) -> str:
     Raises UserError as `factors_between`.
     """
     factors = factors_between(limb, mass, height)
-    content = YAML().load(limb.text)
+    content = placed_yaml(limb.text)
     before = content["person"]
     head = (
         f"# Scaled by `limb scale` from {limb.name} of {before['mass']:g} kg and {before['height']:g} m: lengths times "
