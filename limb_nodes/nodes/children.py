@@ -16,6 +16,7 @@ from pathlib import Path
 
 from limb_nodes.bags.unclosed import new_part
 from limb_nodes.errors import RunError, UserError
+from limb_nodes.exchange.recorded import RecordedRun
 from limb_nodes.foundation.topics import NODES
 from limb_nodes.nodes.base import PARENT, STAY
 from limb_nodes.nodes.settings import RunSettings
@@ -74,7 +75,8 @@ class Crew:
         """The node anew, which goes on from the bag of the run once something is in it."""
         settings = self._settings
         out = Path(settings.out)
-        if self._recorded() >= 0:
+        # On a busy machine the bag may hold ticks of which this process has not heard yet.
+        if self._recorded() >= 0 or holds_ticks(out):
             settings = replace(settings, resume=settings.out)
             if name == "recorder":
                 return Child(replace(settings, out=str(new_part(out))), name, copies=False)
@@ -88,6 +90,14 @@ class Crew:
         for name in ENDED:
             if name in self.children:
                 self.children[name].end()
+
+
+def holds_ticks(bag: Path) -> bool:
+    """Whether a run could go on from what a bag holds."""
+    try:
+        return RecordedRun.read(str(bag)).past().complete >= 0
+    except UserError:
+        return False
 
 
 class Child:
