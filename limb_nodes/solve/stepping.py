@@ -16,16 +16,17 @@ import numpy as np
 from limb_nodes.foundation.arrays import FloatArray
 from limb_nodes.foundation.records import Record
 from limb_nodes.model.limb import Limb
-from limb_nodes.solve.course import METHODS
 from limb_nodes.solve.explicit import EXPLICIT
 from limb_nodes.solve.failure import FAILURES, SolveError, fault_of
 from limb_nodes.solve.held import hold, predict
+from limb_nodes.solve.implicit import IMPLICIT
 from limb_nodes.solve.integrate import DONE, STRUCK, integrate
 from limb_nodes.solve.outputs import CROSSING_OUTPUTS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import bent, part_of, straight
 from limb_nodes.solve.problem import CONTROL, give_inputs, new_problem
 from limb_nodes.solve.ranges import Ranges
 from limb_nodes.solve.small import same
+from limb_nodes.solve.stiffness import STIFF, stiffness_of
 from limb_nodes.solve.whole import WholeModel
 
 TICK_TOLERANCE = 1e-9
@@ -85,9 +86,22 @@ class MuscleStepper:
         self._data = self.model.new_data(1.0)
         rates = program.muscle_rates_c.address if layout.states else 0
         self._problem = new_problem(layout.states, rates, layout.model, self._data)
-        self._method = METHODS[self.model.suited_method].free if layout.states else EXPLICIT.free
-        if self._method.implicit[0]:
+        self._method = EXPLICIT.free
+        if self._stiffness() > STIFF:
+            self._method = IMPLICIT.free
             self._problem.jacobian[0] = program.muscle_jacobian_c.address
+
+    def _stiffness(self) -> float:
+        """Fastest rate (1/s) of the muscles, the joints as at the start; the limb's own rates need not be compiled."""
+        layout, n = self.model.layout, self.joints
+        if not layout.states:
+            return 0.0
+        data, start = self.model.new_data(1.0), self.model.initial_state()
+        data.angles_before[:] = data.angles_after[:] = start[:n]
+        data.velocities_before[:] = data.velocities_after[:] = start[n : 2 * n]
+        problem = new_problem(layout.states, self.model.program.muscle_rates_c.address, layout.model, data)
+        given = layout.initial_states.copy(), layout.state_scales, layout.states, self.model.equal_drives
+        return stiffness_of(problem, *given)
 
     def adopt(self, model: WholeModel) -> None:
         """Go on with the numbers of another model that has the same program."""

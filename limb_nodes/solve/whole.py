@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -22,10 +21,11 @@ from limb_nodes.solve.data import data_type
 from limb_nodes.solve.delay import delayed, delays_of, refuse_long_delays
 from limb_nodes.solve.drive_table import DriveTable
 from limb_nodes.solve.failure import FAILURES, SolveError, where
-from limb_nodes.solve.integrate import NOT_FINITE, difference_slopes
+from limb_nodes.solve.integrate import NOT_FINITE
 from limb_nodes.solve.outputs import CROSSING_OUTPUTS, MUSCLE_OUTPUTS, UNIT_OUTPUTS
 from limb_nodes.solve.pieces import pieces
-from limb_nodes.solve.problem import give_inputs, new_problem
+from limb_nodes.solve.problem import new_problem
+from limb_nodes.solve.stiffness import STIFF, stiffness_of
 
 ANGLE_SCALE, VELOCITY_SCALE = 1.0, 10.0
 TOLERANCE = 1e-9
@@ -33,10 +33,6 @@ TOLERANCE = 1e-9
 # compiled for one solve.
 TABLE_PAYS = 2_000
 TABLE_PAYS_ONCE = 1_000_000
-# Rate (1/s) from which the implicit method's longer steps outweigh that each costs more.
-STIFF = 6000.0
-# How far each internal state is moved, over its typical size, to see how stiff tendons are that pull.
-STRETCH = 0.1
 # Numbers of a part of a movement that is solved piece by piece, and most of its instants.
 PART, LONGEST_PART = 2**18, 2048
 
@@ -160,28 +156,14 @@ class WholeModel:
         return out[:-1].T
 
     def stiffness(self) -> float:
-        """Fastest rate (1/s) of the limb at its start, with all muscles fully excited or with none, whose tendons pull.
-
-        By differences: the program of the exact slopes need not be compiled to find that it is not
-        needed.
-        """
-        start = self.initial_state()
-        pulling = start.copy()
-        pulling[2 * self.layout.joints :] += STRETCH * self.layout.state_scales
-        # What no muscle force damps is as fast as its own damper lets it be.
-        rates = [self._fastest(start, 1.0), self._fastest(pulling, 0.0)]
-        # Of rates at the start that are not finite the solve itself tells; the other posture is none of the limb's.
-        return max(rates) if math.isfinite(rates[1]) else rates[0]
-
-    def _fastest(self, state: FloatArray, excitation: float) -> float:
-        """The fastest rate (1/s) at a state, all muscles equally excited; infinite if a slope is not finite."""
-        slopes = np.empty((state.size, state.size))
-        inputs = pieces(self.drives(np.full((1, self.layout.muscles), excitation)))
+        """Fastest rate (1/s) of the limb at its start, as `stiffness_of` looks for it."""
         data = self.new_data(1.0)
-        problem = self.problem(data)
-        give_inputs(problem, inputs)
-        difference_slopes(problem.address, state, self.state_scale, slopes)
-        return float(np.abs(np.linalg.eigvals(slopes)).max()) if np.isfinite(slopes).all() else math.inf
+        given = self.initial_state(), self.state_scale, self.layout.states, self.equal_drives
+        return stiffness_of(self.problem(data), *given)
+
+    def equal_drives(self, excitation: float) -> FloatArray:
+        """The drives [1, drives] if all muscles are equally excited."""
+        return self.drives(np.full((1, self.layout.muscles), excitation))
 
     @cached_property
     def suited_method(self) -> str:
@@ -272,7 +254,7 @@ class WholeModel:
         for stretch, pause in stretches(drives, count, period, rows, course):
             states = course.advance(stretch, pause)
             given = excitation[done : done + len(states)]
-            reaching = delayed(excitation, delays, done, done + len(states))
+            reaching = delayed(excitation, delays, done, done + len(states)) if delays.any() else given
             done += len(states)
             if len(states):
                 movement = self._movement(stretch, states, given, reaching, seen if observe else (), course.steps)
