@@ -34,14 +34,14 @@ def run(args: argparse.Namespace) -> int:
         raise FieldError("mass", "is missing, and height too; one of them or both are needed")
     if Path(args.out).exists():
         raise FieldError("out", f"is {args.out}, which exists; the name of a new file is needed")
-    text = scaled_text(limb, args.mass, args.height)
+    factors = factors_between(limb, args.mass, args.height)
+    text = scaled_text(limb, factors)
     # What is written can be read: a joint's range may not fit fibres of another length.
     parse_limb(text, args.out, args.allow_laws)
     try:
         Path(args.out).write_text(text, encoding="utf-8")
     except OSError as problem:
         raise FieldError("out", f"is {args.out}, which cannot be written: {problem.strerror or problem}") from None
-    factors = factors_between(limb, args.mass, args.height)
     print(f"lengths    times {factors.length:.4g}")
     print(f"masses     times {factors.mass:.4g}")
     print(f"forces     times {factors.force:.4g}")

@@ -81,12 +81,8 @@ def factors_between(limb: Limb, mass: float | None, height: float | None) -> Fac
     return Factors(new.height / limb.person.height, ratio, ratio ** (2.0 / 3.0))
 
 
-def scaled_text(limb: Limb, mass: float | None, height: float | None) -> str:
-    """The YAML of a limb for a person of a mass (kg) and a height (m): other numbers in the same text.
-
-    Raises UserError as `factors_between`.
-    """
-    factors = factors_between(limb, mass, height)
+def scaled_text(limb: Limb, factors: Factors) -> str:
+    """The YAML of a limb for the person that the factors lead to: other numbers in the same text."""
     content = placed_yaml(limb.text)
     before = content["person"]
     head = (

@@ -39,17 +39,20 @@ FREE = {
     f"{MUSCLE}.tendon.slack_length": (0.0171, 0.0145, 0.0187),
     f"{MUSCLE}.activation_dynamics.rise_time": (0.03, 0.005, 0.15),
 }
-# The same of the shipped limb.
+# The same of the shipped limb; these are free in both.
+ALIKE = (
+    f"{UNIT}.sarcomere.eccentric_plateau",
+    f"{MUSCLE}.tendon.damping",
+    f"{MUSCLE}.tendon.slack_length",
+    f"{MUSCLE}.activation_dynamics.rise_time",
+)
 FREE_SHIPPED = {
     f"{UNIT}.parallel_sarcomeres": (1.305e12, 1.24e12, 1.45e12),
     f"{UNIT}.sarcomere.maximum_velocity": (14.35e-6, 8e-6, 2.4e-5),
     f"{UNIT}.sarcomere.curvature": (0.3, 0.05, 1.5),
-    f"{UNIT}.sarcomere.eccentric_plateau": (1.4, 1.1, 2.0),
     f"{MUSCLE}.tendon.strain_at_maximum": (0.049, 0.03, 0.12),
     f"{MUSCLE}.tendon.toe_force": (0.33, 0.1, 0.6),
-    f"{MUSCLE}.tendon.damping": (1.0, 0.02, 10.0),
-    f"{MUSCLE}.tendon.slack_length": (0.0171, 0.0145, 0.0187),
-    f"{MUSCLE}.activation_dynamics.rise_time": (0.03, 0.005, 0.15),
+    **{place: FREE[place] for place in ALIKE},
 }
 Free = dict[str, tuple[float, float, float]]
 

@@ -46,7 +46,7 @@ def shown(limb, angle: float) -> tuple[dict[str, np.ndarray], np.ndarray]:
 def test_the_same_limb_in_other_units(name):
     """Lengths, forces and torques at the start in proportion; what has no unit stays."""
     limb = parse_limb(texts()[name], name)
-    smaller = parse_limb(scaled_text(limb, 60.0, 1.6), name)
+    smaller = parse_limb(scaled_text(limb, factors_between(limb, 60.0, 1.6)), name)
     factors = factors_between(limb, 60.0, 1.6)
     assert (factors.length, factors.mass) == pytest.approx((1.6 / 1.75, 0.8))
     assert factors.force == pytest.approx(0.8 ** (2 / 3))
@@ -63,7 +63,7 @@ def test_the_same_limb_in_other_units(name):
 
 def test_tissue_gives_moments_in_proportion():
     limb = parse_limb(texts()["tissue"], "tissue")
-    other = parse_limb(scaled_text(limb, 100.0, 1.9), "tissue")
+    other = parse_limb(scaled_text(limb, factors_between(limb, 100.0, 1.9)), "tissue")
     factors = factors_between(limb, 100.0, 1.9)
     for one, new in zip(limb.segments[0].tissue, other.segments[0].tissue, strict=True):
         for angle, velocity in (0.9, 0.0), (1.1, 0.3), (-0.1, -0.2):
@@ -75,8 +75,8 @@ def test_tissue_gives_moments_in_proportion():
 @pytest.mark.parametrize("name", texts())
 def test_there_and_back(name):
     limb = parse_limb(texts()[name], name)
-    there = parse_limb(scaled_text(limb, 95.0, 1.95), name)
-    back = parse_limb(scaled_text(there, 75.0, 1.75), name)
+    there = parse_limb(scaled_text(limb, factors_between(limb, 95.0, 1.95)), name)
+    back = parse_limb(scaled_text(there, factors_between(there, 75.0, 1.75)), name)
     returned = dict(numbers(back.content))
     for place, before in numbers(limb.content):
         assert returned[place] == pytest.approx(before, rel=2e-5), place
