@@ -3,9 +3,8 @@
 A unit that has just been recruited twitches: its mean force is a share of its tetanus, and not 0 as 2.23 has it.
 """
 
-import math
-
 from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.levels.bent_rise import bent_rise
 from limb_nodes.levels.contracts import register
 from limb_nodes.levels.equation import Law, equation
 
@@ -28,8 +27,7 @@ def force_frequency_factor(
     if part <= 0.0:
         # Below the lowest frequency single twitches follow each other more slowly.
         return twitch_ratio * stimulation_frequency / minimum_frequency
-    rise = part if steepness < 1e-6 else math.expm1(-steepness * part) / math.expm1(-steepness)
-    return twitch_ratio + (1.0 - twitch_ratio) * rise
+    return twitch_ratio + (1.0 - twitch_ratio) * bent_rise(part, -steepness)
 
 
 twitch_tetanus = register(

@@ -8,11 +8,9 @@ tau time_constant, A shape, (u_0, a_0) node, d curve_height, c curve_rate.
 import math
 
 from limb_nodes.foundation.parameter import Parameter
+from limb_nodes.levels.bent_rise import STRAIGHT, bent_rise
 from limb_nodes.levels.contracts import register
 from limb_nodes.levels.equation import Law, State, equation
-
-# Below this, the exponential curve is a straight line to the last digit but one.
-STRAIGHT = 1e-6
 
 
 @equation("du/dt", "neural_activation_rate")
@@ -38,10 +36,7 @@ def initial_neural_velocity() -> float:
 @equation("Lloyd-Besier", "activation")
 def exponential_curve(neural_activation: float, shape: float) -> float:
     """Activation (1), (exp(A u) - 1)/(exp(A) - 1): from 0 to 1, straight if A is 0."""
-    rising = max(0.0, neural_activation)
-    if abs(shape) < STRAIGHT:
-        return rising
-    return math.expm1(shape * rising) / math.expm1(shape)
+    return bent_rise(max(0.0, neural_activation), shape)
 
 
 @equation("u_0", "node_excitation")
