@@ -12,6 +12,7 @@ import pytest
 from limb_nodes.bags.read import BagReader
 from limb_nodes.exchange.recorded import RecordedRun
 from limb_nodes.foundation.topics import NODES
+from limb_nodes.nodes.children import holds_ticks
 from tests.graph.conftest import children_of
 
 SECONDS = "8"
@@ -86,6 +87,17 @@ def test_killed_nodes_are_started_anew(names, begun, undisturbed, bags):
     assert [path.name for path in out.parent.iterdir() if path.name.startswith((out.name, "."))] == [out.name]
     with BagReader(out) as bag:
         assert bag.count("robot_description") == 1
+
+
+def test_a_bag_tells_whether_a_run_could_go_on_from_it(undisturbed, tmp_path):
+    """Also one that is being written, of which the process of the run has not heard a tick yet."""
+    data = (undisturbed / f"{undisturbed.name}.mcap").read_bytes()
+    for size, holds in (0, False), (100, False), (len(data) // 2, True), (len(data), True):
+        bag = tmp_path / str(size)
+        bag.mkdir()
+        (bag / f"{bag.name}.mcap").write_bytes(data[:size])
+        assert holds_ticks(bag) == holds
+    assert not holds_ticks(tmp_path / "none")
 
 
 def test_a_node_that_is_stopped_is_named_and_goes_on_with_the_run(begun, undisturbed, until, bags):
