@@ -39,6 +39,8 @@ UNITS = {
     "N m s/rad": (1, 1),
     "N m/rad^1.5": (1, 1),
 }
+# What a number may consist of.
+NUMBER = "-+.0123456789eE_"
 LEAST_BODY_MASS_INDEX, GREATEST_BODY_MASS_INDEX = 8.0, 100.0
 
 
@@ -100,10 +102,11 @@ def scaled_text(limb: Limb, factors: Factors) -> str:
 
 def edits_of(section: Any, key: str | int, new: Any) -> Iterator[tuple[int, int, str]]:
     """Lines, columns and texts that make of a value another; a key that is not there comes first."""
-    if key not in section if isinstance(key, str) else False:
-        line, column = section.lc.key(next(iter(section.lc.data)))
+    if isinstance(key, str) and key not in section:
+        owner = next(one for one in owners(section) if one.lc.data)
+        line, column = owner.lc.key(next(iter(owner.lc.data)))
         added = f"{key}: {written(new)}"
-        yield line, column, f"{added}, " if section.fa.flow_style() else f"{added}\n{' ' * column}"
+        yield line, column, f"{added}, " if owner.fa.flow_style() else f"{added}\n{' ' * column}"
     elif isinstance(new, list):
         for index, one in enumerate(new):
             yield from edits_of(section[key], index, one)
@@ -122,7 +125,7 @@ def edited(line: str, column: int, text: str) -> str:
     """A line with another number at a column, or with a key before what stands there; a comment keeps its column."""
     if ":" in text:
         return line[:column] + text + line[column:]
-    rest = line[column:].lstrip("-+.0123456789eE")
+    rest = line[column:].lstrip(NUMBER)
     longer = len(text) - (len(line) - column - len(rest))
     space = len(rest) - len(rest.lstrip(" "))
     if rest.lstrip(" ").startswith("#") and space > longer:
@@ -161,18 +164,17 @@ def changes(content: Any, limb: Limb, factors: Factors) -> Iterator[Change]:
 def named(section: Any, factors: dict[str, float]) -> Iterator[Change]:
     """The keys of a section that are there."""
     for key, factor in factors.items():
-        owner = owner_of(section, key)
+        owner = next((one for one in owners(section) if key in (one.lc.data or ())), None)
         if owner is not None and owner[key] is not None:
             yield owner, key, rounded(owner[key], factor)
 
 
-def owner_of(section: Any, key: str) -> Any:
-    """The mapping in which a key of a section stands: itself, or one that it is merged with."""
-    if key in (section.lc.data or {}):
-        return section
-    # A library of before 0.19 tells the place of each as well.
-    merged = (one[1] if isinstance(one, tuple) else one for one in section.merge)
-    return next((found for one in merged if (found := owner_of(one, key)) is not None), None)
+def owners(section: Any) -> Iterator[Any]:
+    """The mappings in which keys of a section stand: itself, and those that it is merged with."""
+    yield section
+    for one in section.merge:
+        # A library of before 0.19 tells the place of each as well.
+        yield from owners(one[1] if isinstance(one, tuple) else one)
 
 
 def of_law(section: Any, chosen: ChosenLaw, factors: Factors) -> Iterator[Change]:

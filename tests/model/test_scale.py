@@ -137,3 +137,18 @@ def test_whose_limb_it_is_must_be_known(tmp_path, capsys):
     assert cli.main(["scale", str(ROOT / "params/arm.yaml"), "--mass", "60", "-o", str(existing)]) == 2
     assert "exists; the name of a new file is needed" in capsys.readouterr().err
     assert existing.read_text() == "kept"
+
+
+def test_what_a_merge_shares_is_scaled_once():
+    """Also a default that is written down for a section which has no key of its own."""
+    text = texts()["defaults"]
+    tendon = "    tendon: {law: toe_region, slack_length: 0.03, maximum_force: 100.0}\n"
+    assert text.count(tendon) == 2
+    first = tendon.replace("tendon: {", "tendon: &tendon {")
+    shared = text.replace(tendon, first, 1).replace(tendon, "    tendon: {<<: *tendon}\n", 1)
+    limb, plain = parse_limb(shared, "shared"), parse_limb(text, "plain")
+    factors = factors_between(limb, 60.0, 1.6)
+    one, other = (parse_limb(scaled_text(limb, factors), limb.file) for limb in (limb, plain))
+    for muscle, wanted in zip(one.muscles, other.muscles, strict=True):
+        assert muscle.laws["tendon"].values == wanted.laws["tendon"].values
+    assert one.muscles[0].laws["tendon"].values["damping"] == pytest.approx(1e4 * factors.of(-1, 0, 1), rel=1e-5)
